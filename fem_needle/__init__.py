@@ -1,0 +1,1 @@
+"""Flexible needles in soft tissue: the finite-element reference and the shared tools."""

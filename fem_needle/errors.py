@@ -1,0 +1,31 @@
+"""The package's exceptions and warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class NeedleError(Exception):
+    """Base of every error that the package raises on purpose."""
+
+
+class SceneError(NeedleError, ValueError):
+    """Impossible input: every mistake of a scene at once.
+
+    Parameters
+    ----------
+    mistakes
+        One line each: path of the key, value, unit and allowed range.
+    """
+
+    def __init__(self, mistakes: Sequence[str] | str) -> None:
+        self.mistakes = (mistakes,) if isinstance(mistakes, str) else tuple(mistakes)
+        super().__init__("\n".join(self.mistakes))
+
+
+class ComputationError(NeedleError, RuntimeError):
+    """A computation failed: says at which time and depth, and what to change."""
+
+
+class SuspiciousValueWarning(UserWarning):
+    """Possible but unlikely input; the message names the inequality."""

@@ -1,0 +1,1 @@
+"""Assumed-mode models of a needle in soft tissue."""
