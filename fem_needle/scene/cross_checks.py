@@ -1,0 +1,91 @@
+"""Mistakes between the parts of a scene: what fits the needle, the tissue and the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from fem_needle.scene.loads import LateralLoad
+from fem_needle.scene.part import Mistake
+
+if TYPE_CHECKING:
+    from fem_needle.scene.scene import Scene
+
+# Depths may pass 0 and the length by this share of the length: integrals of
+# tables end on such round numbers only to rounding.
+ROUNDING = 1e-12
+
+
+def cross_mistakes(scene: Scene) -> Iterator[Mistake]:
+    """Yield all mistakes between parts that are each correct."""
+    if scene.insertion.end_time is None and scene.run.duration is None:
+        message = "is required, because this insertion does not end by itself (allowed above 0 s)"
+        yield Mistake("run.duration", message)
+        return
+    yield from _depth_mistakes(scene)
+    if scene.support.kind == "hub":
+        yield from _place_mistakes(scene)
+        yield from _kinematics_mistakes(scene)
+    else:
+        yield from _entry_mistakes(scene)
+
+
+def _depth_mistakes(scene: Scene) -> Iterator[Mistake]:
+    length, insertion = scene.needle.length, scene.insertion
+    lowest, highest = insertion.depth_range(scene.duration)
+    slack = ROUNDING * length
+    allowed = f"allowed 0 to {length:g} m, the needle's length"
+    for key in ("initial_depth", "final_depth"):
+        depth = getattr(insertion, key)
+        if depth is not None and depth > length:
+            yield Mistake(f"insertion.{key}", f"deeper than the needle is long (got {depth:g}; {allowed})", depth)
+            slack = float("inf")  # the same mistake, not to be told twice
+    key = {"speed": "speed", "profile": "depth"}.get(insertion.kind, "initial_depth")
+    for extreme in (lowest, highest):
+        if not -slack <= extreme <= length + slack:
+            message = f"the depth leaves the needle in the run (reaches {extreme:.9g}; {allowed})"
+            yield Mistake(f"insertion.{key}", message, extreme)
+
+
+def _places(scene: Scene) -> Iterator[tuple[str, str, float]]:
+    """Yield path, name and y of guides and lateral forces."""
+    for index, guide in enumerate(scene.support.guides):
+        yield f"support.guides.{index}.position", "guide", guide.position
+    for index, load in enumerate(scene.loads):
+        if isinstance(load, LateralLoad):
+            yield f"loads.{index}.position", "lateral force", load.position
+
+
+def _place_mistakes(scene: Scene) -> Iterator[Mistake]:
+    """Report guides and forces inside tissue, in the hub's way, or off the needle."""
+    length = scene.needle.length
+    lowest, highest = scene.insertion.depth_range(scene.duration)
+    for path, name, y in _places(scene):
+        for layer in scene.tissue.layers:
+            # y = 0 is the skin, where the robot's finger may touch.
+            if layer.holds(y) and y != 0.0:
+                outside = f"got {y:g}; allowed below {layer.start:g} or from {layer.far_side:g} m"
+                yield Mistake(path, f"the {name} lies inside the tissue ({outside})", y)
+        if highest - length >= y:
+            limits = f"got {y:g}; allowed above {highest - length:.9g} m"
+            message = f"the hub meets the {name} at the depth {y + length:.9g} m of {highest:.9g} m ({limits})"
+            yield Mistake(path, message, y)
+        if y > 0.0 and y > lowest:
+            limits = f"got {y:g}; allowed at most {lowest:.9g} m, the smallest depth of the run"
+            yield Mistake(path, f"the {name} is not always on the needle ({limits})", y)
+
+
+def _kinematics_mistakes(scene: Scene) -> Iterator[Mistake]:
+    if scene.model.kinematics == "fixed-frame":
+        message = "has no meaning under the support 'hub' (got 'fixed-frame'; allowed 'material')"
+        yield Mistake("model.kinematics", message, "fixed-frame")
+
+
+def _entry_mistakes(scene: Scene) -> Iterator[Mistake]:
+    for index, load in enumerate(scene.loads):
+        if isinstance(load, LateralLoad):
+            message = "a lateral force has no meaning under the support 'entry' (got 'lateral'; allowed 'tip')"
+            yield Mistake(f"loads.{index}.kind", message, "lateral")
+    if scene.initial.shape == "tip-displaced" and scene.insertion.first_depth <= 1e-6 * scene.needle.length:
+        message = "nothing is inserted that could bend (got 'tip-displaced'; allowed 'equilibrium' or 'straight')"
+        yield Mistake("initial.shape", message, "tip-displaced")

@@ -1,0 +1,93 @@
+"""The mistakes of a scene as lines of text: path, message, value, allowed range."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
+
+from pydantic import ValidationError
+
+from fem_needle.scene.part import Part, shown
+from fem_needle.scene.time_functions import Table
+from fem_needle.scene.time_quantity import SINUSOID_KEYS, TABLE_KEYS
+
+Location = tuple[int | str, ...]
+
+
+def mistake_lines(error: ValidationError, root: type[Part]) -> tuple[str, ...]:
+    """Return one line for each mistake of a validation of ``root``."""
+    lines = []
+    for detail in error.errors(include_url=False):
+        location = tuple(detail["loc"])
+        path = ".".join(str(key) for key in without_tags(location)) or "scene"
+        lines.append(f"{path}: {_message(dict(detail), location, root)}")
+    return tuple(dict.fromkeys(lines))
+
+
+def without_tags(location: Location) -> Location:
+    """Return a location without the tag that follows the number of a load."""
+    if len(location) > 2 and location[0] == "loads" and location[2] in ("tip", "lateral"):
+        return location[:2] + location[3:]
+    return location
+
+
+def _message(detail: dict[str, Any], location: Location, root: type[Part]) -> str:
+    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
+    if kind == "extra_forbidden":
+        return nearest_text(str(location[-1]), known_keys(root, location[:-1]))
+    if kind == "missing":
+        return "is required"
+    if kind == "literal_error":
+        return f"is not a choice (got {shown(value)}; allowed {context['expected']})"
+    if kind == "union_tag_not_found":
+        return "needs a kind (allowed 'tip' or 'lateral')"
+    if kind == "union_tag_invalid":
+        return f"kind is not a choice (got '{context['tag']}'; allowed {context['expected_tags']})"
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return f"is not a table of keys (got {shown(value)})"
+    if kind == "tuple_type":
+        return f"is not a list (got {shown(value)})"
+    if kind == "string_type":
+        return f"is not a text (got {shown(value)})"
+    return str(detail["msg"])
+
+
+def nearest_text(key: str, known: tuple[str, ...]) -> str:
+    """Return the message for an unknown key, with the nearest known one."""
+    close = get_close_matches(key, known, n=1, cutoff=0.5)
+    hint = f"did you mean '{close[0]}'?" if close else f"known: {', '.join(known) or 'none'}"
+    return f"unknown key; {hint}"
+
+
+def known_keys(root: type[Part], location: Location) -> tuple[str, ...]:
+    """Return the keys that a scene file may have at a location."""
+    parts: list[Any] = [root]
+    for key in location:
+        if isinstance(key, int):
+            continue
+        tagged = [part for part in parts if _tag(part) == key]
+        found = [part.model_fields[key].annotation for part in parts if key in part.model_fields]
+        parts = tagged or [part for annotation in found for part in _parts_of(annotation)]
+    if Table in parts:
+        return TABLE_KEYS + SINUSOID_KEYS
+    return tuple(dict.fromkeys(field for part in parts for field in part.model_fields))
+
+
+def _tag(part: type[Part]) -> Any:
+    kind = part.model_fields.get("kind")
+    return kind.default if kind else None
+
+
+def _parts_of(annotation: Any) -> list[type[Part]]:
+    """Return the classes of scene parts inside an annotation."""
+    if isinstance(annotation, type) and issubclass(annotation, Part):
+        return [annotation]
+    inner = get_args(annotation) if get_origin(annotation) in (Union, UnionType, tuple) else ()
+    return [part for item in inner for part in _parts_of(_bare(item))]
+
+
+def _bare(annotation: Any) -> Any:
+    return getattr(annotation, "__origin__", annotation) if hasattr(annotation, "__metadata__") else annotation
+
+

@@ -1,0 +1,60 @@
+"""The base of all parts of a scene, and the way in which they report mistakes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+MISTAKE = "mistake"
+
+
+class Part(BaseModel):
+    """A frozen piece of a scene; unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
+
+
+class Mistake(NamedTuple):
+    """One mistake found between fields.
+
+    Attributes
+    ----------
+    path
+        Key, dotted, relative to the part that was checked.
+    message
+        What is wrong and what would be allowed.
+    value
+        The value found.
+    """
+
+    path: str
+    message: str
+    value: Any = None
+
+
+def shown(value: Any) -> str:
+    """Return a short text of a value for a message."""
+    text = f"{value:.12g}" if isinstance(value, float) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def custom_error(message: str) -> PydanticCustomError:
+    """Return the error that carries ``message`` word for word."""
+    return PydanticCustomError(MISTAKE, "{message}", {"message": message})
+
+
+def raise_mistakes(title: str, mistakes: Iterable[Mistake]) -> None:
+    """Raise one `pydantic.ValidationError` that lists all mistakes, if there are any."""
+    details = [
+        InitErrorDetails(type=custom_error(item.message), loc=_location(item.path), input=item.value)
+        for item in mistakes
+    ]
+    if details:
+        raise ValidationError.from_exception_data(title, details)
+
+
+def _location(path: str) -> tuple[int | str, ...]:
+    return tuple(int(key) if key.isdigit() else key for key in path.split(".")) if path else ()

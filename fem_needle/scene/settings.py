@@ -1,0 +1,130 @@
+"""Friction, start, run, model and numerics of a scene."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import model_validator
+
+from fem_needle.scene.part import Mistake, Part, raise_mistakes
+from fem_needle.scene.quantity import Quantity
+
+_STEP = Quantity("s", above=0.0, words=("auto",))
+
+
+class Friction(Part):
+    """Axial friction of the shaft: sign(v) coulomb + viscous v.
+
+    Parameters
+    ----------
+    coulomb
+        [N].
+    viscous
+        [N s/m].
+    coulomb_per_length
+        [N/m], times the inserted length, added.
+    viscous_per_length
+        [N s/m^2], times the inserted length, added.
+    """
+
+    coulomb: Annotated[float, Quantity("N", at_least=0.0)] = 0.0
+    viscous: Annotated[float, Quantity("N s/m", at_least=0.0)] = 0.0
+    coulomb_per_length: Annotated[float, Quantity("N/m", at_least=0.0)] = 0.0
+    viscous_per_length: Annotated[float, Quantity("N s/m^2", at_least=0.0)] = 0.0
+
+
+class Initial(Part):
+    """How the needle starts.
+
+    Parameters
+    ----------
+    shape
+        ``"equilibrium"`` under the loads at t = 0, ``"straight"``, or
+        ``"tip-displaced"``: static shape under a tip force, let go at rest.
+    tip_deflection
+        Of the tip-displaced shape [m].
+    """
+
+    shape: Literal["equilibrium", "straight", "tip-displaced"] = "equilibrium"
+    tip_deflection: Annotated[float | None, Quantity("m", optional=True)] = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        displaced = self.shape == "tip-displaced"
+        if displaced and self.tip_deflection is None:
+            message = "is required by shape 'tip-displaced' (allowed any finite number m)"
+            raise_mistakes("Initial", [Mistake("tip_deflection", message)])
+        if not displaced and self.tip_deflection is not None:
+            limits = f"got {self.tip_deflection:g}; allowed only with shape 'tip-displaced'"
+            message = f"has no meaning with shape '{self.shape}' ({limits})"
+            raise_mistakes("Initial", [Mistake("tip_deflection", message, self.tip_deflection)])
+        return self
+
+
+class Run(Part):
+    """Duration and seed of a run.
+
+    Parameters
+    ----------
+    duration
+        [s]; None: until the insertion ends.
+    seed
+        Of the random numbers.
+    """
+
+    duration: Annotated[float | None, Quantity("s", above=0.0, optional=True)] = None
+    seed: Annotated[int, Quantity(at_least=0, integer=True)] = 0
+
+
+class Model(Part):
+    """Which model computes the scene.
+
+    Parameters
+    ----------
+    kind
+        ``"fem"``: finite elements.
+    kinematics
+        ``"material"``, or under the support entry ``"fixed-frame"``, the
+        kinetic energy of the growing domain without convective terms.
+    """
+
+    kind: Literal["fem"] = "fem"
+    kinematics: Literal["material", "fixed-frame"] = "material"
+
+
+class Numerics(Part):
+    """Accuracy and output.
+
+    Parameters
+    ----------
+    elements
+        Equal elements over the part that bends, or ``"auto"``.
+    degree
+        Polynomial degree of an element, 3 or 4.
+    time_step
+        [s] or ``"auto"``.
+    tolerance
+        Largest tip error over the run by largest tip deflection.
+    absolute_tolerance
+        Floor of the tip error [m].
+    analysis
+        ``"dynamic"``, ``"quasi-static"``, ``"static"`` or ``"auto"``.
+    spectral_radius
+        Of the integrator at infinite frequency: 1 no numerical damping, 0 the strongest.
+    output_step
+        Time between samples [s] or ``"auto"``.
+    output_points
+        Stations along the needle.
+    """
+
+    elements: Annotated[
+        int | Literal["auto"], Quantity(at_least=1, at_most=1_000_000, integer=True, words=("auto",))
+    ] = "auto"
+    degree: Annotated[int, Quantity(at_least=3, at_most=4, integer=True)] = 4
+    time_step: Annotated[float | Literal["auto"], _STEP] = "auto"
+    tolerance: Annotated[float, Quantity(at_least=1e-10, at_most=0.1)] = 1e-3
+    absolute_tolerance: Annotated[float, Quantity("m", above=0.0)] = 1e-9
+    analysis: Literal["auto", "dynamic", "quasi-static", "static"] = "auto"
+    spectral_radius: Annotated[float, Quantity(at_least=0.0, at_most=1.0)] = 1.0
+    output_step: Annotated[float | Literal["auto"], _STEP] = "auto"
+    output_points: Annotated[int, Quantity(at_least=2, at_most=100_001, integer=True)] = 101

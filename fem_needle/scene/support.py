@@ -1,0 +1,68 @@
+"""What holds the needle outside the tissue: the hub or the surface, and guides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self
+
+from pydantic import model_validator
+
+from fem_needle.scene.part import Mistake, Part, raise_mistakes
+from fem_needle.scene.quantity import Quantity
+from fem_needle.scene.time_quantity import TimeQuantity, TimeValue
+
+
+class Guide(Part):
+    """A template guide at a fixed place outside the tissue.
+
+    Parameters
+    ----------
+    position
+        y [m], negative before the surface.
+    stiffness
+        Lateral spring [N/m], or ``"rigid"`` for a pin.
+    """
+
+    position: Annotated[float, Quantity("m")]
+    stiffness: Annotated[float | Literal["rigid"], Quantity("N/m", above=0.0, words=("rigid",))] = "rigid"
+
+
+class Support(Part):
+    """Where the needle is clamped.
+
+    Parameters
+    ----------
+    kind
+        ``"hub"``: clamped at the hub, the whole needle bends; ``"entry"``:
+        clamped at the tissue surface, only the inserted part bends.
+    hub_deflection
+        Lateral position of the hub [m], may vary in time; hub only.
+    hub_angle
+        Angle of the hub [rad], may vary in time; hub only.
+    guides
+        Hub only.
+    """
+
+    kind: Literal["hub", "entry"]
+    hub_deflection: Annotated[TimeValue, TimeQuantity("m")] = 0.0
+    hub_angle: Annotated[TimeValue, TimeQuantity("rad")] = 0.0
+    guides: tuple[Guide, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        raise_mistakes("Support", self._mistakes())
+        return self
+
+    def _mistakes(self) -> Iterator[Mistake]:
+        positions = [guide.position for guide in self.guides]
+        for index, position in enumerate(positions):
+            if position in positions[:index]:
+                message = f"two guides at one place (got {position:g}; allowed different places)"
+                yield Mistake(f"guides.{index}.position", message, position)
+        if self.kind == "entry":
+            for name, moved in (("hub_deflection", self.hub_deflection), ("hub_angle", self.hub_angle)):
+                if moved != 0.0:
+                    yield Mistake(name, "has no meaning under the support 'entry' (allowed 0, or kind = 'hub')")
+            if self.guides:
+                message = "has no meaning under the support 'entry', where nothing outside bends (allowed none)"
+                yield Mistake("guides", message)

@@ -1,0 +1,110 @@
+"""Columns of a CSV file as tables in time.
+
+The header names the columns, each with a unit in brackets or without (SI):
+``time [s],speed [mm/s]``.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+from typing import Any
+
+from fem_needle.scene import units
+
+FILE_KEYS = ("file", "column")
+LARGEST_FILE = 50_000_000
+
+_HEADER = re.compile(r"\s*([^\[\]]*?)\s*(?:\[([^\[\]]*)\])?\s*")
+
+
+def read_table(file: str, column: str, folder: Path | None) -> dict[str, Any]:
+    """Return ``time``, ``value`` and ``unit`` of one column, as a scene writes them.
+
+    Parameters
+    ----------
+    file
+        Path inside ``folder``.
+    column
+        Name in the header, without its unit.
+    folder
+        The scene's folder; None where a scene has none.
+
+    Raises
+    ------
+    ValueError
+        If the file is outside the folder, missing, no text, or lacks numbers.
+    """
+    lines = read_text(_inside(file, folder)).splitlines()
+    rows = [row for row in csv.reader(lines) if row]
+    if len(rows) < 3:
+        raise ValueError(f"{file!r} needs a header and at least two rows")
+    header = [_column(cell) for cell in rows[0]]
+    names = [name for name, _ in header]
+    for wanted in ("time", column):
+        if names.count(wanted) != 1:
+            raise ValueError(f"{file!r} needs one column {wanted!r} (got {', '.join(names)})"[:300])
+    time_unit = units.parse_unit(header[names.index("time")][1] or "s")
+    if time_unit.dimension != units.parse_unit("s").dimension:
+        raise ValueError(f"{file!r} has a time column in {header[names.index('time')][1]!r}; allowed a time, as s")
+    times = _numbers(rows, names.index("time"), file)
+    result: dict[str, Any] = {
+        "time": [time_unit.to_si(time) for time in times],
+        "value": _numbers(rows, names.index(column), file),
+    }
+    unit = header[names.index(column)][1]
+    return result if unit is None else result | {"unit": unit}
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file that a user named.
+
+    Raises
+    ------
+    ValueError
+        If it is missing, no plain file, huge, empty, or not UTF-8 text.
+    """
+    if not path.is_file():
+        raise ValueError(f"{path.name!r} is not a file" if path.exists() else f"{path.name!r} does not exist")
+    if path.stat().st_size > LARGEST_FILE:
+        raise ValueError(f"{path.name!r} is larger than {LARGEST_FILE / 1e6:g} MB")
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError(f"{path.name!r} is not UTF-8 text") from None
+    except OSError as error:
+        raise ValueError(f"{path.name!r} cannot be read: {error.strerror}") from None
+    if "\0" in text:
+        raise ValueError(f"{path.name!r} is not text")
+    if not text.strip():
+        raise ValueError(f"{path.name!r} is empty")
+    return text
+
+
+def _inside(file: str, folder: Path | None) -> Path:
+    if folder is None:
+        raise ValueError(f"{file!r} needs a scene in a folder; write time and value instead")
+    written = Path(file)
+    if "\0" in file or written.is_absolute() or ".." in written.parts:
+        raise ValueError(f"{file!r} must lie inside the scene's folder")
+    path = (folder / written).resolve()
+    if not path.is_relative_to(folder.resolve()):
+        raise ValueError(f"{file!r} must lie inside the scene's folder")
+    return path
+
+
+def _column(cell: str) -> tuple[str, str | None]:
+    match = _HEADER.fullmatch(cell)
+    return (match[1], match[2]) if match else (cell.strip(), None)
+
+
+def _numbers(rows: list[list[str]], index: int, file: str) -> list[float]:
+    numbers = []
+    for line, row in enumerate(rows[1:], start=2):
+        try:
+            numbers.append(float(row[index]))
+        except (ValueError, IndexError):
+            found = row[index] if index < len(row) else "nothing"
+            raise ValueError(f"{file!r} row {line} column {index + 1} is not a number (got {found[:40]!r})") from None
+    return numbers
