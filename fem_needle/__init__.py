@@ -1,1 +1,50 @@
 """Flexible needles in soft tissue: the finite-element reference and the shared tools."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+# Name and the module that defines it, imported at its first use: `--help` pays for nothing else.
+_HOMES = {
+    "load_scene": "fem_needle.scene_file",
+    "parse_scene": "fem_needle.scene_file",
+    "save_scene": "fem_needle.scene_file",
+    "suspicious": "fem_needle.checks",
+    "NeedleError": "fem_needle.errors",
+    "SceneError": "fem_needle.errors",
+    "ComputationError": "fem_needle.errors",
+    "SuspiciousValueWarning": "fem_needle.errors",
+} | dict.fromkeys(
+    (
+        "Friction",
+        "Guide",
+        "Initial",
+        "Insertion",
+        "LateralLoad",
+        "Layer",
+        "Model",
+        "Needle",
+        "Numerics",
+        "Run",
+        "Scene",
+        "Sinusoid",
+        "Support",
+        "Table",
+        "TipLoad",
+        "Tissue",
+    ),
+    "fem_needle.scene",
+)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its module."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'fem_needle' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return sorted(_HOMES)

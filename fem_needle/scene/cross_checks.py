@@ -38,7 +38,8 @@ def _depth_mistakes(scene: Scene) -> Iterator[Mistake]:
     for key in ("initial_depth", "final_depth"):
         depth = getattr(insertion, key)
         if depth is not None and depth > length:
-            yield Mistake(f"insertion.{key}", f"deeper than the needle is long (got {depth:g}; {allowed})", depth)
+            message = f"deeper than the needle is long (got {depth:g}; {allowed})"
+            yield Mistake(f"insertion.{key}", message, depth)
             slack = float("inf")  # the same mistake, not to be told twice
     key = {"speed": "speed", "profile": "depth"}.get(insertion.kind, "initial_depth")
     for extreme in (lowest, highest):
@@ -64,11 +65,12 @@ def _place_mistakes(scene: Scene) -> Iterator[Mistake]:
         for layer in scene.tissue.layers:
             # y = 0 is the skin, where the robot's finger may touch.
             if layer.holds(y) and y != 0.0:
-                outside = f"got {y:g}; allowed below {layer.start:g} or from {layer.far_side:g} m"
+                beyond = "" if layer.end is None else f" or from {layer.end:g} m"
+                outside = f"got {y:g}; allowed at most {layer.start:g} m{beyond}"
                 yield Mistake(path, f"the {name} lies inside the tissue ({outside})", y)
         if highest - length >= y:
-            limits = f"got {y:g}; allowed above {highest - length:.9g} m"
-            message = f"the hub meets the {name} at the depth {y + length:.9g} m of {highest:.9g} m ({limits})"
+            limits = f"got {y:g}; allowed above {highest - length:.9g} m, where the hub gets"
+            message = f"the hub meets the {name} at the depth {y + length:.9g} m ({limits})"
             yield Mistake(path, message, y)
         if y > 0.0 and y > lowest:
             limits = f"got {y:g}; allowed at most {lowest:.9g} m, the smallest depth of the run"
@@ -84,8 +86,8 @@ def _kinematics_mistakes(scene: Scene) -> Iterator[Mistake]:
 def _entry_mistakes(scene: Scene) -> Iterator[Mistake]:
     for index, load in enumerate(scene.loads):
         if isinstance(load, LateralLoad):
-            message = "a lateral force has no meaning under the support 'entry' (got 'lateral'; allowed 'tip')"
+            message = "a lateral force has no meaning under 'entry' (got 'lateral'; allowed 'tip')"
             yield Mistake(f"loads.{index}.kind", message, "lateral")
     if scene.initial.shape == "tip-displaced" and scene.insertion.first_depth <= 1e-6 * scene.needle.length:
-        message = "nothing is inserted that could bend (got 'tip-displaced'; allowed 'equilibrium' or 'straight')"
+        message = "nothing inserted could bend (got 'tip-displaced'; allowed 'equilibrium', 'straight')"
         yield Mistake("initial.shape", message, "tip-displaced")

@@ -57,13 +57,14 @@ class Insertion(Part):
                 yield Mistake(key, f"is required by an insertion of kind '{self.kind}'")
             if value is not None and key not in _REQUIRED[self.kind] + _ALLOWED[self.kind]:
                 allowed = ", ".join(_REQUIRED[self.kind] + _ALLOWED[self.kind])
-                message = f"does not belong to an insertion of kind '{self.kind}' (got {shown(value)}; allowed {allowed})"
+                found = f"got {shown(value)}; allowed {allowed}"
+                message = f"does not belong to an insertion of kind '{self.kind}' ({found})"
                 yield Mistake(key, message, value)
 
     def _value_mistakes(self) -> Iterator[Mistake]:
         if isinstance(self.speed, Table | Sinusoid):
             if self.final_depth is not None:
-                message = "belongs to a plain speed; here the depth is the integral of the speed (allowed none)"
+                message = "belongs to a plain speed; the depth is the integral of the speed (allowed none)"
                 yield Mistake("final_depth", message, self.final_depth)
         elif self.speed is not None:
             yield from self._final_depth_mistakes(self.speed)
@@ -75,7 +76,8 @@ class Insertion(Part):
 
     def _final_depth_mistakes(self, speed: float) -> Iterator[Mistake]:
         if speed == 0.0:
-            yield Mistake("speed", "does not move (got 0; allowed above or below 0 m/s, or kind = 'hold')", speed)
+            message = "does not move (got 0; allowed above or below 0 m/s, or kind = 'hold')"
+            yield Mistake("speed", message, speed)
         elif self.final_depth is None:
             yield Mistake("final_depth", "is required by a plain speed")
         elif (self.final_depth - self.first_depth) * speed <= 0.0:

@@ -8,11 +8,27 @@ from typing import Any, Union, get_args, get_origin
 
 from pydantic import ValidationError
 
+from fem_needle.errors import SceneError
 from fem_needle.scene.part import Part, shown
+from fem_needle.scene.plain_data import LISTS
 from fem_needle.scene.time_functions import Table
 from fem_needle.scene.time_quantity import SINUSOID_KEYS, TABLE_KEYS
 
 Location = tuple[int | str, ...]
+
+# By the type of pydantic's error; what is not here already speaks for itself.
+_NOT_A_TABLE = "is not a table of keys (got {value})"
+_TEMPLATES = {
+    "missing": "is required",
+    "literal_error": "is not a choice (got {value}; allowed {expected})",
+    "union_tag_not_found": "needs a kind (allowed 'tip' or 'lateral')",
+    "union_tag_invalid": "kind is not a choice (got '{tag}'; allowed {expected_tags})",
+    "model_type": _NOT_A_TABLE,
+    "model_attributes_type": _NOT_A_TABLE,
+    "dict_type": _NOT_A_TABLE,
+    "tuple_type": "is not a list (got {value})",
+    "string_type": "is not a text (got {value})",
+}
 
 
 def mistake_lines(error: ValidationError, root: type[Part]) -> tuple[str, ...]:
@@ -33,24 +49,12 @@ def without_tags(location: Location) -> Location:
 
 
 def _message(detail: dict[str, Any], location: Location, root: type[Part]) -> str:
-    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
-    if kind == "extra_forbidden":
+    if detail["type"] == "extra_forbidden":
         return nearest_text(str(location[-1]), known_keys(root, location[:-1]))
-    if kind == "missing":
-        return "is required"
-    if kind == "literal_error":
-        return f"is not a choice (got {shown(value)}; allowed {context['expected']})"
-    if kind == "union_tag_not_found":
-        return "needs a kind (allowed 'tip' or 'lateral')"
-    if kind == "union_tag_invalid":
-        return f"kind is not a choice (got '{context['tag']}'; allowed {context['expected_tags']})"
-    if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return f"is not a table of keys (got {shown(value)})"
-    if kind == "tuple_type":
-        return f"is not a list (got {shown(value)})"
-    if kind == "string_type":
-        return f"is not a text (got {shown(value)})"
-    return str(detail["msg"])
+    template = _TEMPLATES.get(detail["type"])
+    if template is None:
+        return str(detail["msg"])
+    return template.format(value=shown(detail["input"]), **detail.get("ctx", {}))
 
 
 def nearest_text(key: str, known: tuple[str, ...]) -> str:
@@ -74,6 +78,25 @@ def known_keys(root: type[Part], location: Location) -> tuple[str, ...]:
     return tuple(dict.fromkeys(field for part in parts for field in part.model_fields))
 
 
+def check_path(root: type[Part], path: str) -> None:
+    """Compare each key of a dotted path with the known ones.
+
+    Raises
+    ------
+    SceneError
+        At the first unknown key, with the nearest known one.
+    """
+    location: Location = ()
+    for key in path.split("."):
+        if location and location[-1] in LISTS:
+            location = (*location, 0)  # any entry: which one there is, only the data know
+            continue
+        known = known_keys(root, location)
+        if known and key not in known:
+            raise SceneError(f"{path}: {nearest_text(key, known)}")
+        location = (*location, key)
+
+
 def _tag(part: type[Part]) -> Any:
     kind = part.model_fields.get("kind")
     return kind.default if kind else None
@@ -88,6 +111,7 @@ def _parts_of(annotation: Any) -> list[type[Part]]:
 
 
 def _bare(annotation: Any) -> Any:
-    return getattr(annotation, "__origin__", annotation) if hasattr(annotation, "__metadata__") else annotation
+    """Return an annotation without its metadata."""
+    return annotation.__origin__ if hasattr(annotation, "__metadata__") else annotation
 
 

@@ -77,8 +77,9 @@ class Needle(Part):
             if self.outer_diameter is None:
                 yield Mistake("inner_diameter", "needs outer_diameter as well", self.inner_diameter)
             elif self.inner_diameter >= self.outer_diameter:
-                limits = f"got {self.inner_diameter:g}; allowed 0 to below outer_diameter = {self.outer_diameter:g} m"
-                yield Mistake("inner_diameter", f"the tube has no wall ({limits})", self.inner_diameter)
+                limits = f"0 to below outer_diameter = {self.outer_diameter:g} m"
+                message = f"the tube has no wall (got {self.inner_diameter:g}; allowed {limits})"
+                yield Mistake("inner_diameter", message, self.inner_diameter)
 
     def _two_ways(self) -> Iterator[Mistake]:
         exclusive = (
@@ -90,8 +91,8 @@ class Needle(Part):
             for other in others:
                 if self.given(name) and self.given(other):
                     value = getattr(self, other)
-                    message = f"given in two ways, with {name} and with {other} (got {value:g}); allowed one of them"
-                    yield Mistake(other, message, value)
+                    ways = f"with {name} and with {other}"
+                    yield Mistake(other, f"given in two ways, {ways} (got {value:g}; allowed one)", value)
 
     def _too_little(self) -> Iterator[Mistake]:
         ways = (

@@ -8,8 +8,8 @@ from fem_needle.errors import SceneError
 from fem_needle.scene.needle import Needle
 from fem_needle.scene.part import Part
 
-# Lists of a scene file and the length up to which they are empty by default.
-_LISTS = {"guides", "layers", "loads"}
+# Keys of a scene file that hold lists.
+LISTS = {"guides", "layers", "loads"}
 
 
 def plain(value: Any, *, complete: bool) -> Any:
@@ -45,8 +45,6 @@ def _kept(part: Part, name: str, complete: bool) -> bool:
 def with_entry(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
     """Return plain data with another value at a path; None removes the key.
 
-    Unknown keys are left to the check of the new scene, which knows the nearest.
-
     Raises
     ------
     SceneError
@@ -61,12 +59,12 @@ def _replaced(data: Any, keys: list[str], value: Any, path: str) -> Any:
     key, rest = keys[0], keys[1:]
     if isinstance(data, list):
         index = _index(data, key, path)
-        return data[:index] + [_replaced(data[index], rest, value, path)] + data[index + 1 :]
+        return [*data[:index], _replaced(data[index], rest, value, path), *data[index + 1 :]]
     if not isinstance(data, dict):
         raise SceneError(f"{path}: there is nothing inside a single value (at '{key}')")
     if not rest and value is None:
         return {name: item for name, item in data.items() if name != key}
-    missing: Any = [] if key in _LISTS else {}
+    missing: Any = [] if key in LISTS else {}
     return data | {key: _replaced(data.get(key, missing), rest, value, path)}
 
 

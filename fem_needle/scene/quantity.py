@@ -125,8 +125,9 @@ class Quantity:
         if self.at_least is not None and self.at_most is not None:
             text = f"{self.at_least:g} to {self.at_most:g}"
         else:
-            words = {"at least": self.at_least, "above": self.above, "at most": self.at_most, "below": self.below}
-            bounds = [f"{word} {bound:g}" for word, bound in words.items() if bound is not None]
+            words = ("at least", "above", "at most", "below")
+            limits = zip(words, (self.at_least, self.above, self.at_most, self.below), strict=True)
+            bounds = [f"{word} {bound:g}" for word, bound in limits if bound is not None]
             text = " and ".join(bounds) or "any finite number"
         unit = "" if self.unit == "1" else f" {self.unit}"
         return text + unit + "".join(f" or '{word}'" for word in self.words)

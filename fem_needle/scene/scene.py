@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import StrictStr, ValidationError, model_validator
 
@@ -12,7 +12,7 @@ from fem_needle.errors import SceneError
 from fem_needle.scene.cross_checks import cross_mistakes
 from fem_needle.scene.insertion import Insertion
 from fem_needle.scene.loads import Load
-from fem_needle.scene.mistakes import mistake_lines
+from fem_needle.scene.mistakes import check_path, mistake_lines
 from fem_needle.scene.needle import Needle
 from fem_needle.scene.part import Part, raise_mistakes, shown
 from fem_needle.scene.plain_data import plain, with_entry
@@ -112,5 +112,6 @@ class Scene(Part):
         """Return the scene with several values changed at once; see `with_value`."""
         data = self.to_dict()
         for path, value in values.items():
+            check_path(type(self), path)
             data = with_entry(data, path, value)
         return self.from_dict(data)

@@ -62,7 +62,7 @@ class Support(Part):
         if self.kind == "entry":
             for name, moved in (("hub_deflection", self.hub_deflection), ("hub_angle", self.hub_angle)):
                 if moved != 0.0:
-                    yield Mistake(name, "has no meaning under the support 'entry' (allowed 0, or kind = 'hub')")
+                    yield Mistake(name, "has no meaning under 'entry' (allowed 0, or kind = 'hub')")
             if self.guides:
-                message = "has no meaning under the support 'entry', where nothing outside bends (allowed none)"
+                message = "has no meaning under 'entry', where nothing outside bends (allowed none)"
                 yield Mistake("guides", message)

@@ -45,9 +45,10 @@ def read_table(file: str, column: str, folder: Path | None) -> dict[str, Any]:
     for wanted in ("time", column):
         if names.count(wanted) != 1:
             raise ValueError(f"{file!r} needs one column {wanted!r} (got {', '.join(names)})"[:300])
-    time_unit = units.parse_unit(header[names.index("time")][1] or "s")
+    written = header[names.index("time")][1] or "s"
+    time_unit = units.parse_unit(written)
     if time_unit.dimension != units.parse_unit("s").dimension:
-        raise ValueError(f"{file!r} has a time column in {header[names.index('time')][1]!r}; allowed a time, as s")
+        raise ValueError(f"{file!r} has times in {written!r} (allowed a time, as s)")
     times = _numbers(rows, names.index("time"), file)
     result: dict[str, Any] = {
         "time": [time_unit.to_si(time) for time in times],
@@ -106,5 +107,6 @@ def _numbers(rows: list[list[str]], index: int, file: str) -> list[float]:
             numbers.append(float(row[index]))
         except (ValueError, IndexError):
             found = row[index] if index < len(row) else "nothing"
-            raise ValueError(f"{file!r} row {line} column {index + 1} is not a number (got {found[:40]!r})") from None
+            place = f"{file!r} row {line} column {index + 1}"
+            raise ValueError(f"{place} is not a number (got {found[:40]!r})") from None
     return numbers

@@ -45,7 +45,7 @@ class TimeFunction(Protocol):
 def _like(time: FloatOrArray, result: Any) -> FloatOrArray:
     """Return ``result`` as a float where ``time`` is a number, else as an array."""
     if np.ndim(time) == 0:
-        return cast(FloatOrArray, float(result))
+        return cast(FloatOrArray, float(result))  # type: ignore[redundant-cast]
     return cast(FloatOrArray, np.asarray(result, dtype=float))
 
 
@@ -106,8 +106,8 @@ class Table(Part):
             yield Mistake("time", f"too short (got {len(self.time)} points; allowed at least 2)")
         for index, (earlier, later) in enumerate(pairwise(self.time), start=1):
             if later <= earlier:
-                message = f"times must rise (got {later:.12g} after {earlier:.12g}; allowed above {earlier:.12g} s)"
-                yield Mistake(f"time.{index}", message, later)
+                limits = f"got {later:.12g}; allowed above {earlier:.12g} s, the time before"
+                yield Mistake(f"time.{index}", f"times must rise ({limits})", later)
                 return
 
     @property
@@ -148,7 +148,7 @@ class Table(Part):
         times, values = self._points
         nearest = np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 1)
         mean = (values[nearest] + np.interp(time, times, values)) / 2.0
-        return cast(Vector, self._areas[nearest] + (time - times[nearest]) * mean)
+        return self._areas[nearest] + (time - times[nearest]) * mean
 
     def zeros(self, end: float) -> Vector:
         """Return the times in (0, ``end``) [s] where the value crosses zero."""
@@ -187,7 +187,7 @@ class Sinusoid(Part):
         return ()
 
     def _angle(self, time: FloatOrArray) -> Vector:
-        return cast(Vector, 2.0 * pi * self.frequency * np.asarray(time, dtype=float) + self.phase)
+        return 2.0 * pi * self.frequency * np.asarray(time, dtype=float) + self.phase
 
     def value(self, time: FloatOrArray) -> FloatOrArray:
         """Return the value at ``time`` [s]."""

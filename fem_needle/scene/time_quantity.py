@@ -47,7 +47,7 @@ class TimeQuantity(Quantity):
         forms = (
             ({"time": numbers, "value": numbers, "unit": {"type": "string"}}, ["time", "value"]),
             (dict.fromkeys(SINUSOID_KEYS, number_or_text), ["amplitude", "frequency"]),
-            (dict.fromkeys(FILE_KEYS, {"type": "string"}), list(FILE_KEYS)),
+            ({key: {"type": "string"} for key in FILE_KEYS}, list(FILE_KEYS)),
         )
         return super().json_choices() + [
             {"type": "object", "properties": keys, "required": required, "additionalProperties": False}
@@ -91,8 +91,8 @@ class TimeQuantity(Quantity):
         except ValueError:
             found = None
         if found is None or found.dimension != expected.dimension:
-            name = units.dimension_name(expected.dimension)
-            mistakes.append(Mistake("unit", f"wrong unit (got {shown(unit)}; allowed a {name}, as {self.unit})", unit))
+            allowed = f"{units.dimension_name(expected.dimension)}, as {self.unit}"
+            mistakes.append(Mistake("unit", f"wrong unit (got {shown(unit)}; allowed a {allowed})", unit))
         return found
 
     def _element(self, value: Any, path: str, unit: units.Unit | None, mistakes: list[Mistake]) -> Any:

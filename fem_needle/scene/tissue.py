@@ -44,8 +44,8 @@ class Layer(Part):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.far_side <= self.start:
-            message = f"the layer has no thickness (got {self.far_side:g}; allowed above start = {self.start:g} m)"
-            raise_mistakes("Layer", [Mistake("end", message, self.end)])
+            limits = f"got {self.far_side:g}; allowed above start = {self.start:g} m"
+            raise_mistakes("Layer", [Mistake("end", f"the layer has no thickness ({limits})", self.end)])
         return self
 
     @property
@@ -86,7 +86,8 @@ class Tissue(Part):
     def _mistakes(self) -> Iterator[Mistake]:
         for (first, one), (second, other) in combinations(enumerate(self.layers), 2):
             if one.name and one.name == other.name:
-                yield Mistake(f"layers.{second}.name", f"names must differ (got {other.name!r} twice)", other.name)
+                message = f"names must differ (got {other.name!r} twice; allowed once)"
+                yield Mistake(f"layers.{second}.name", message, other.name)
             if one.start < other.far_side and other.start < one.far_side:
                 lower, upper = sorted((one, other), key=lambda layer: layer.start)
                 index = second if upper is other else first

@@ -179,9 +179,8 @@ def to_si(text: str, unit: str) -> float:
         raise ValueError("a text needs a unit")
     found = parse_unit(written)
     if found.dimension != expected.dimension:
-        raise ValueError(
-            f"expected a {dimension_name(expected.dimension)} in {unit}, not a {dimension_name(found.dimension)}"
-        )
+        wanted, given = dimension_name(expected.dimension), dimension_name(found.dimension)
+        raise ValueError(f"expected a {wanted} in {unit}, not a {given}")
     return found.to_si(number)
 
 

@@ -1,0 +1,144 @@
+"""Suspicious values: possible, but more likely a slip. Each message names its inequality."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from math import inf, pi
+
+from fem_needle.errors import SuspiciousValueWarning
+from fem_needle.scene import Scene, TipLoad
+from fem_needle.scene.listing import entries
+from fem_needle.scene.time_functions import Sinusoid, Table
+from fem_needle.scene.time_quantity import TimeValue, extremes
+
+NOT_YOUNGS_MODULUS = (
+    "foundation_modulus is lateral force per length and deflection [N/m^2], "
+    "not the Young's modulus of the tissue"
+)
+
+
+def suspicious(scene: Scene) -> tuple[str, ...]:
+    """Return a message for each suspicious value; none for an ordinary scene."""
+    checks = (_units, _needle, _layers, _push, _tip_force, _times)
+    return tuple(message for check in checks for message in check(scene))
+
+
+def warn_if_suspicious(scene: Scene) -> tuple[str, ...]:
+    """Issue a `SuspiciousValueWarning` for each message of `suspicious`, and return them."""
+    messages = suspicious(scene)
+    for message in messages:
+        warnings.warn(message, SuspiciousValueWarning, stacklevel=2)
+    return messages
+
+
+def _largest(value: TimeValue) -> float:
+    """Return the largest magnitude of a value over all times."""
+    return max(abs(extreme) for extreme in extremes(value))
+
+
+def _units(scene: Scene) -> Iterator[str]:
+    """Look for numbers written in another unit than SI: mm, GPa, degrees, mm/s."""
+    for path, value, quantity in entries(scene):
+        if quantity is None or not isinstance(value, float | Table | Sinusoid):
+            continue
+        largest = _largest(value)
+        if quantity.unit == "m" and largest > 1.0:
+            yield f"{path} = {largest:g} m > 1 m: looks like mm"
+        elif quantity.unit == "Pa" and largest < 1e6:
+            yield f"{path} = {largest:g} Pa < 1e6 Pa: looks like GPa"
+        elif quantity.unit == "rad" and largest > 0.5:
+            yield f"{path} = {largest:g} rad > 0.5 rad: looks like degrees"
+        elif quantity.unit == "m/s" and largest > 5.0:
+            yield f"{path} = {largest:g} m/s > 5 m/s: looks like mm/s"
+
+
+def _needle(scene: Scene) -> Iterator[str]:
+    length, diameter = scene.needle.length, scene.needle.outer_diameter
+    if diameter is not None and diameter > length / 10.0:
+        yield (
+            f"needle.outer_diameter = {diameter:g} m > length / 10 = {length / 10.0:g} m: "
+            "too thick for a slender beam, or a unit is wrong"
+        )
+
+
+def _layers(scene: Scene) -> Iterator[str]:
+    thinnest = scene.needle.length / 1000.0
+    for index, layer in enumerate(scene.tissue.layers):
+        path = f"tissue.layers.{index}"
+        if layer.foundation_modulus > 1e6:
+            yield (
+                f"{path}.foundation_modulus = {layer.foundation_modulus:g} N/m^2 > 1e6 N/m^2: "
+                f"looks like a Young's modulus; {NOT_YOUNGS_MODULUS}"
+            )
+        if layer.far_side - layer.start < thinnest:
+            thickness = layer.far_side - layer.start
+            yield f"{path}: thickness {thickness:g} m < needle.length / 1000 = {thinnest:g} m: very thin"
+
+
+def _push(scene: Scene) -> Iterator[str]:
+    """Compare the push that the insertion needs with the Euler load of the free part.
+
+    The free part is taken as clamped at the hub and free at the skin:
+    P = pi^2 EI / (2 L)^2 [N].
+    """
+    free = scene.needle.length - scene.insertion.first_depth
+    push = _needed_push(scene)
+    euler = pi**2 * scene.needle.bending_stiffness / (2.0 * free) ** 2 if free > 0.0 else inf
+    if push > euler:
+        yield (
+            f"the push that the insertion needs, {push:.3g} N > {euler:.3g} N, "
+            f"the Euler load pi^2 EI / (2 L)^2 of the free part (L = {free:g} m): the needle may buckle"
+        )
+
+
+def _needed_push(scene: Scene) -> float:
+    """Return friction and largest cutting force at the first depth and the largest speed [N]."""
+    friction, depth = scene.friction, scene.insertion.first_depth
+    speed = 0.0 if scene.insertion.speed is None else _largest(scene.insertion.speed)
+    coulomb = friction.coulomb + friction.coulomb_per_length * depth
+    viscous = friction.viscous + friction.viscous_per_length * depth
+    cutting = max((layer.cutting_force for layer in scene.tissue.layers), default=0.0)
+    return coulomb + viscous * speed + cutting
+
+
+def _tip_force(scene: Scene) -> Iterator[str]:
+    """Estimate the tip deflection as that of a cantilever, F L^3 / (3 EI).
+
+    L is the length that bends, at most (3/2)^(1/3) / lambda, with
+    lambda = (k / 4 EI)^(1/4): there the cantilever deflects as the end of a
+    half-infinite beam on a foundation, 2 F lambda / k (Hetenyi).
+    """
+    stiffness = scene.needle.bending_stiffness
+    moduli = [layer.foundation_modulus for layer in scene.tissue.layers]
+    softest, stiffest = min(moduli, default=0.0), max(moduli, default=0.0)
+    _, deepest = scene.insertion.depth_range(scene.duration)
+    bending = scene.needle.length if scene.support.kind == "hub" else deepest
+    decay = (softest / (4.0 * stiffness)) ** 0.25
+    estimate_length, limit = bending, 0.1 * bending
+    if decay > 0.0:
+        estimate_length, limit = min(bending, 1.5 ** (1.0 / 3.0) / decay), 0.1 * min(bending, 2.0 / decay)
+    force = sum(_tip_load(load, stiffest) for load in scene.loads if isinstance(load, TipLoad))
+    deflection = force * estimate_length**3 / (3.0 * stiffness)
+    if deflection > limit:
+        yield (
+            f"the tip force {force:.3g} N bends the needle by about F L^3 / (3 EI) = {deflection:.3g} m > "
+            f"{limit:.3g} m, 10 % of the length that bends: too much for small deflections"
+        )
+
+
+def _tip_load(load: TipLoad, modulus: float) -> float:
+    """Return the largest magnitude of a tip load [N]."""
+    if load.force is not None:
+        return _largest(load.force)
+    return abs(load.bevel_coefficient or 0.0) * modulus
+
+
+def _times(scene: Scene) -> Iterator[str]:
+    duration = scene.duration
+    for name in ("time_step", "output_step"):
+        step = getattr(scene.numerics, name)
+        if isinstance(step, float) and step > duration:
+            yield f"numerics.{name} = {step:g} s > {duration:g} s, the duration of the run"
+        elif isinstance(step, float) and step < 1e-9 * duration:
+            yield f"numerics.{name} = {step:g} s < 1e-9 times {duration:g} s, the duration: a very long run"

@@ -1,0 +1,69 @@
+"""The command `fem-needle`: thin; every command imports what it needs when it runs.
+
+A command group is a module of this package with ``register(application)``;
+list it in `GROUPS`. Another package adds commands with such a function as an
+entry point of the group ``fem_needle.commands``.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module, metadata
+from typing import Annotated
+
+import typer
+
+from fem_needle.errors import NeedleError, SceneError
+
+GROUPS = ("fem_needle.cli.scene_commands",)
+ENTRY_POINTS = "fem_needle.commands"
+
+WRONG_INPUT = 2
+FAILED = 1
+
+
+def main() -> None:
+    """Run the command line; exit status 0 done, 2 wrong input, 1 failed."""
+    try:
+        build_application()()
+    except SceneError as error:
+        _stop(error.mistakes, WRONG_INPUT)
+    except NeedleError as error:
+        _stop((str(error),), FAILED)
+
+
+def build_application() -> typer.Typer:
+    """Return the application with all command groups."""
+    application = typer.Typer(
+        help="Flexible needles pushed into soft tissue.\n\nExample: fem-needle check thesis",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+    )
+    application.callback()(_options)
+    for group in GROUPS:
+        import_module(group).register(application)
+    for point in metadata.entry_points(group=ENTRY_POINTS):
+        point.load()(application)
+    return application
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"fem-needle {metadata.version('fem-needle')}")
+        raise typer.Exit
+
+
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Hold the options of the command itself."""
+
+
+def _stop(messages: tuple[str, ...], status: int) -> None:
+    """Write one line for each message on stderr and exit."""
+    for message in messages:
+        typer.echo(f"error: {message}", err=True)
+    sys.exit(status)

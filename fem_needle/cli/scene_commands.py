@@ -1,0 +1,110 @@
+"""Commands on scenes: scenes, new, check, schema."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from fem_needle.errors import SceneError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of a shipped scene.")]
+
+
+def register(application: typer.Typer) -> None:
+    """Add the commands of this group."""
+    for name, command in (("scenes", scenes), ("new", new), ("check", check), ("schema", schema)):
+        application.command(name)(command)
+
+
+def scenes() -> None:
+    """List the shipped scenes.
+
+    Example: fem-needle scenes
+    """
+    from fem_needle.shipped import shipped_scenes
+
+    table = _table("", "Name", "What it is")
+    for scene in shipped_scenes():
+        table.add_row(scene.name, scene.title)
+    _show(table)
+
+
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Where to write the scene.")],
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
+) -> None:
+    """Write a commented scene to start from.
+
+    Example: fem-needle new my-needle.toml
+    """
+    from fem_needle.shipped import template_text
+
+    if file.exists() and not force:
+        raise SceneError(f"{file}: exists already; --force overwrites it")
+    try:
+        file.write_text(template_text(), encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{file}: cannot be written: {error}") from None
+    typer.echo(f"wrote {file}; try: fem-needle check {file}")
+
+
+def check(
+    scene: SceneArgument,
+    strict: Annotated[bool, typer.Option("--strict", help="Exit with status 2 on a warning.")] = False,
+) -> None:
+    """Show every value of a scene in SI and in mm, N, s, and what looks suspicious.
+
+    Example: fem-needle check thesis --strict
+    """
+    from fem_needle.checks import NOT_YOUNGS_MODULUS, suspicious
+    from fem_needle.cli.scene_table import scene_rows
+    from fem_needle.scene_file import load_scene
+
+    loaded = load_scene(scene)
+    table = _table(loaded.title, "Key", "SI", "mm, N, s, degrees")
+    for row in scene_rows(loaded):
+        table.add_row(*row)
+    _show(table)
+    typer.echo(f"note: {NOT_YOUNGS_MODULUS}")
+    messages = suspicious(loaded)
+    for message in messages:
+        typer.echo(f"warning: {message}", err=True)
+    if messages and strict:
+        raise typer.Exit(2)
+
+
+def schema() -> None:
+    """Print the JSON schema of a scene file.
+
+    Example: fem-needle schema > scene.schema.json
+    """
+    from fem_needle.scene import Scene
+
+    typer.echo(json.dumps(Scene.model_json_schema(), indent=2, ensure_ascii=False))
+
+
+def _table(title: str, *columns: str) -> Table:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=Text(title) if title else None, box=box.SIMPLE_HEAD)
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    return table
+
+
+def _show(table: Table) -> None:
+    """Print a table; as wide as it is where the output is no terminal, so that no line breaks."""
+    from rich.console import Console
+
+    console = Console(markup=False, highlight=False)
+    if not console.is_terminal:
+        console = Console(markup=False, highlight=False, width=200)
+    console.print(table)
