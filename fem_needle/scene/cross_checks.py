@@ -11,8 +11,8 @@ from fem_needle.scene.part import Mistake
 if TYPE_CHECKING:
     from fem_needle.scene.scene import Scene
 
-# Depths may pass 0 and the length by this share of the length: integrals of
-# tables end on such round numbers only to rounding.
+# Share of the length by which depths may pass 0 and the length, and by which
+# the hub stays clear: integrals and differences hit round numbers only to rounding.
 ROUNDING = 1e-12
 
 
@@ -68,7 +68,7 @@ def _place_mistakes(scene: Scene) -> Iterator[Mistake]:
                 beyond = "" if layer.end is None else f" or from {layer.end:g} m"
                 outside = f"got {y:g}; allowed at most {layer.start:g} m{beyond}"
                 yield Mistake(path, f"the {name} lies inside the tissue ({outside})", y)
-        if highest - length >= y:
+        if highest - length >= y - ROUNDING * length:
             limits = f"got {y:g}; allowed above {highest - length:.9g} m, where the hub gets"
             message = f"the hub meets the {name} at the depth {y + length:.9g} m ({limits})"
             yield Mistake(path, message, y)

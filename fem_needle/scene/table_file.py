@@ -37,7 +37,10 @@ def read_table(file: str, column: str, folder: Path | None) -> dict[str, Any]:
         If the file is outside the folder, missing, no text, or lacks numbers.
     """
     lines = read_text(_inside(file, folder)).splitlines()
-    rows = [row for row in csv.reader(lines) if row]
+    try:
+        rows = [row for row in csv.reader(lines) if row]
+    except csv.Error as error:
+        raise ValueError(f"{file!r} is no CSV: {error}") from None
     if len(rows) < 3:
         raise ValueError(f"{file!r} needs a header and at least two rows")
     header = [_column(cell) for cell in rows[0]]

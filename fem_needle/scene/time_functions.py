@@ -79,6 +79,34 @@ class Constant:
         return _like(time, self.constant * np.asarray(time, dtype=float))
 
 
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """A table as arrays; not compared, the table's own fields are.
+
+    ``slopes`` are those before the first point, of each piece, after the last
+    point; ``areas`` the integrals from the first point to each point.
+    """
+
+    times: Vector
+    values: Vector
+    slopes: Vector
+    areas: Vector
+
+    @classmethod
+    def of(cls, times: Vector, values: Vector) -> _Pieces:
+        # A speed of 1e308 overflows here; the check of the depth then refuses it.
+        with np.errstate(over="ignore", invalid="ignore"):
+            slopes = np.diff(values) / np.diff(times)
+            areas = np.cumsum(np.diff(times) * (values[1:] / 2.0 + values[:-1] / 2.0))
+        return cls(times, values, np.concatenate(([0.0], slopes, [0.0])), np.concatenate(([0.0], areas)))
+
+    def area_to(self, time: Vector) -> Vector:
+        """Return the integral from the first point to ``time``, negative before it."""
+        nearest = np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self.times) - 1)
+        mean = (self.values[nearest] + np.interp(time, self.times, self.values)) / 2.0
+        return self.areas[nearest] + (time - self.times[nearest]) * mean
+
+
 class Table(Part):
     """Linear between points, constant outside.
 
@@ -116,51 +144,32 @@ class Table(Part):
         return self.time
 
     @cached_property
-    def _points(self) -> tuple[Vector, Vector]:
-        return np.array(self.time), np.array(self.values)
-
-    @cached_property
-    def _slopes(self) -> Vector:
-        """Slope before the first point, of each piece, after the last point."""
-        times, values = self._points
-        return np.concatenate(([0.0], np.diff(values) / np.diff(times), [0.0]))
-
-    @cached_property
-    def _areas(self) -> Vector:
-        """Integral from the first point to each point."""
-        times, values = self._points
-        return np.concatenate(([0.0], np.cumsum(np.diff(times) * (values[1:] + values[:-1]) / 2.0)))
+    def _pieces(self) -> _Pieces:
+        return _Pieces.of(np.array(self.time), np.array(self.values))
 
     def value(self, time: FloatOrArray) -> FloatOrArray:
         """Return the value at ``time`` [s]."""
-        return _like(time, np.interp(time, *self._points))
+        return _like(time, np.interp(time, self._pieces.times, self._pieces.values))
 
     def derivative(self, time: FloatOrArray) -> FloatOrArray:
         """Return the slope of the piece that begins at or holds ``time`` [s]."""
-        return _like(time, self._slopes[np.searchsorted(self._points[0], time, side="right")])
+        return _like(time, self._pieces.slopes[np.searchsorted(self._pieces.times, time, side="right")])
 
     def integral(self, time: FloatOrArray) -> FloatOrArray:
         """Return the exact integral from 0 to ``time`` [s]: quadratic between points."""
-        return _like(time, self._area_to(np.asarray(time, dtype=float)) - self._area_to(np.asarray(0.0)))
-
-    def _area_to(self, time: Vector) -> Vector:
-        """Return the integral from the first point to ``time``, negative before it."""
-        times, values = self._points
-        nearest = np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 1)
-        mean = (values[nearest] + np.interp(time, times, values)) / 2.0
-        return self._areas[nearest] + (time - times[nearest]) * mean
+        return _like(time, self._pieces.area_to(np.asarray(time, dtype=float)) - self._pieces.area_to(np.asarray(0.0)))
 
     def zeros(self, end: float) -> Vector:
-        """Return the times in (0, ``end``) [s] where the value crosses zero."""
-        times, values = self._points
+        """Return the times in (0, ``end``) [s] among which the value crosses zero: kinks included."""
+        times, values = self._pieces.times, self._pieces.values
         left, right = values[:-1], values[1:]
         crossing = np.sign(left) * np.sign(right) < 0
         share = left[crossing] / (left[crossing] - right[crossing])
-        return _inside(times[:-1][crossing] + share * np.diff(times)[crossing], end)
+        return _inside(np.concatenate((times, times[:-1][crossing] + share * np.diff(times)[crossing])), end)
 
     def turning_points(self, end: float) -> Vector:
         """Return the times in (0, ``end``) [s] among which lie all interior extremes of the value."""
-        return _inside(self._points[0], end)
+        return _inside(self._pieces.times, end)
 
 
 class Sinusoid(Part):

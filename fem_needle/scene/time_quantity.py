@@ -92,7 +92,7 @@ class TimeQuantity(Quantity):
             found = None
         if found is None or found.dimension != expected.dimension:
             allowed = f"{units.dimension_name(expected.dimension)}, as {self.unit}"
-            mistakes.append(Mistake("unit", f"wrong unit (got {shown(unit)}; allowed a {allowed})", unit))
+            mistakes.append(Mistake("unit", f"wrong unit (got {shown(unit)}; allowed {allowed})", unit))
         return found
 
     def _element(self, value: Any, path: str, unit: units.Unit | None, mistakes: list[Mistake]) -> Any:

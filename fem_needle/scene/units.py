@@ -180,7 +180,7 @@ def to_si(text: str, unit: str) -> float:
     found = parse_unit(written)
     if found.dimension != expected.dimension:
         wanted, given = dimension_name(expected.dimension), dimension_name(found.dimension)
-        raise ValueError(f"expected a {wanted} in {unit}, not a {given}")
+        raise ValueError(f"expected {wanted} in {unit}, not {given}")
     return found.to_si(number)
 
 

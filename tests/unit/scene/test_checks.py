@@ -1,0 +1,69 @@
+import pytest
+
+from fem_needle import shipped
+from fem_needle.checks import suspicious, warn_if_suspicious
+from fem_needle.errors import SuspiciousValueWarning
+from fem_needle.scene import Friction, Layer, Run, Support, Tissue
+from fem_needle.scene_file import load_scene, parse_scene
+from tests.unit.scene.examples import hub_scene
+
+
+@pytest.mark.parametrize("name", shipped.shipped_names())
+def test_shipped_scenes_are_not_suspicious(name):
+    assert suspicious(load_scene(name)) == ()
+
+
+def test_the_template_is_not_suspicious():
+    assert suspicious(parse_scene(shipped.template_text())) == ()
+
+
+@pytest.mark.parametrize(
+    ("values", "inequality", "guess"),
+    [
+        ({"tissue.layers.0.end": 50.0}, "tissue.layers.0.end = 50 m > 1 m", "looks like mm"),
+        ({"needle.length": 2.0, "support.guides": None}, "needle.length = 2 m > 1 m", "looks like mm"),
+        ({"needle.youngs_modulus": 2e5, "loads": []}, "needle.youngs_modulus = 200000 Pa < 1e6 Pa", "looks like GPa"),
+        ({"support.hub_angle": 2.0}, "support.hub_angle = 2 rad > 0.5 rad", "looks like degrees"),
+        ({"support.hub_angle": {"time": [0, 1], "value": [0, -2]}}, "= 2 rad > 0.5 rad", "looks like degrees"),
+        ({"tissue.layers.0.foundation_modulus": 2e6}, "2e+06 N/m^2 > 1e6 N/m^2", "looks like a Young's modulus"),
+        ({"insertion.speed": 10.0}, "insertion.speed = 10 m/s > 5 m/s", "looks like mm/s"),
+        ({"needle.outer_diameter": 0.021}, "outer_diameter = 0.021 m > length / 10 = 0.02 m", "too thick"),
+        ({"tissue.layers.0.end": 1e-4}, "thickness 0.0001 m < needle.length / 1000 = 0.0002 m", "thin"),
+        ({"numerics.time_step": 15.0}, "numerics.time_step = 15 s > 14 s", "duration"),
+        ({"numerics.output_step": 15.0}, "numerics.output_step = 15 s > 14 s", "duration"),
+        ({"loads.0.force": 20.0}, "the tip force 20 N bends", "too much for small deflections"),
+        ({"loads.0.force": None, "loads.0.bevel_coefficient": 20 / 520}, "the tip force 20 N bends", "too much"),
+    ],
+)
+def test_a_suspicious_value_names_its_inequality(values, inequality, guess):
+    (message,) = [line for line in suspicious(hub_scene().with_values(values)) if inequality in line]
+    assert guess in message
+
+
+def test_the_euler_load_of_the_free_part():
+    """Pi^2 EI / (2 L)^2 with EI = 0.01572216 and L = 0.18 m: 1.19730 N."""
+    below, above = (hub_scene(friction=Friction(coulomb=push)) for push in (1.197, 1.1975))
+    assert suspicious(below) == ()
+    (message,) = suspicious(above)
+    assert "1.2 N > 1.2 N, the Euler load" in message
+
+
+def test_the_push_adds_friction_and_cutting():
+    """0.2 + 20 N/m 0.02 m + (10 + 500 0.02) N s/m 0.01 m/s + 0.4 N = 1.2 N > 1.1973 N."""
+    friction = Friction(coulomb=0.2, coulomb_per_length=20.0, viscous=10.0, viscous_per_length=500.0)
+    layer = Layer(foundation_modulus=520.0, cutting_force=0.4)
+    assert any("Euler" in line for line in suspicious(hub_scene(friction=friction, tissue=Tissue(layers=[layer]))))
+    lower = Layer(foundation_modulus=520.0, cutting_force=0.39)
+    assert suspicious(hub_scene(friction=friction, tissue=Tissue(layers=[lower]))) == ()
+
+
+def test_a_needle_that_is_wholly_inserted_has_no_free_part():
+    scene = hub_scene(support=Support(kind="entry"), friction=Friction(coulomb=9.0), run=Run(duration=1.0))
+    values = {"insertion.kind": "hold", "insertion.initial_depth": 0.2, "insertion.speed": None, "insertion.final_depth": None}
+    assert suspicious(scene.with_values(values)) == ()
+
+
+def test_warnings_are_issued():
+    scene = hub_scene().with_value("support.hub_angle", 2.0)
+    with pytest.warns(SuspiciousValueWarning, match="looks like degrees"):
+        assert len(warn_if_suspicious(scene)) == 1
