@@ -1,0 +1,74 @@
+"""Two-stage collocation methods with a chosen spectral radius at infinite frequency.
+
+The nodes are the zeros of P2(x) - alpha P1(x), shifted Legendre polynomials on 0..1, with alpha = (1 - rho)/(1 + rho). Then
+R(infinity) = rho: rho = 1 is Gauss (order 4, no numerical damping, keeps quadratic invariants), rho = 0 is Radau IIA (order 3,
+L-stable); every member is A-stable. Source: Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Collocation:
+    """Coefficients of one method on a unit step.
+
+    Attributes
+    ----------
+    nodes, weights
+        c and b, shape (2,).
+    inverse
+        A^-1, shape (2, 2): slopes at the nodes of the polynomial through 0 at the start and given values at the nodes.
+    end
+        b A^-1: the polynomial's value at the end of the step from its values at the nodes.
+    start_slope, end_slope
+        Its derivative at the start and at the end, likewise.
+    start_value, end_value
+        The line through the values at the nodes, at the start and at the end (for multipliers, which have no value at the
+        start of a step).
+    """
+
+    nodes: Array
+    weights: Array
+    inverse: Array
+    end: Array
+    start_slope: Array
+    end_slope: Array
+    start_value: Array
+    end_value: Array
+
+
+@lru_cache
+def collocation(spectral_radius: float) -> Collocation:
+    """Return the method with R(infinity) = ``spectral_radius``, 0 to 1."""
+    alpha = (1 - spectral_radius) / (1 + spectral_radius)
+    middle, half = (3 + alpha) / 6, np.sqrt((3 + alpha) ** 2 / 36 - (1 + alpha) / 6)
+    first, second = middle - half, min(middle + half, 1.0)
+    gap = second - first
+    # Lagrange polynomials of the derivative, integrated from 0
+    matrix = np.array(
+        [
+            [(second * x - x**2 / 2) / gap, (x**2 / 2 - first * x) / gap]
+            for x in (first, second)
+        ]
+    )
+    weights = np.array([(second - 0.5) / gap, (0.5 - first) / gap])
+    inverse = np.linalg.inv(matrix)
+    at_start, at_end = np.array([second, -first]) / gap, np.array([second - 1, 1 - first]) / gap
+    return Collocation(
+        nodes=np.array([first, second]),
+        weights=weights,
+        inverse=inverse,
+        end=weights @ inverse,
+        start_slope=at_start @ inverse,
+        end_slope=at_end @ inverse,
+        start_value=at_start,
+        end_value=at_end,
+    )

@@ -1,0 +1,56 @@
+"""What a point force does inside an element beyond the element's own shapes.
+
+Clamp an element at both ends and push at place a: it takes the shape h^3/EI g(x, a), whose third derivative jumps at a. In the
+bending energy this shape is orthogonal to the cubic shapes; what it shares with the bubble is taken off. Adding force times the
+rest of it to the deflection keeps a point force exact wherever it lies, and costs no coordinate: a point at a node adds
+nothing. Source: Green's function of the clamped-clamped beam (docs/theory.md, section "Point forces").
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.elements.reference import BUBBLE_ENERGY
+
+Array = NDArray[np.float64]
+
+
+def kink(place: Array | float, force_place: float, degree: int, derivative: int = 0) -> Array:
+    """Return the shape g (1), or a derivative by place, at places 0..1 of an element pushed at ``force_place``."""
+    x = np.asarray(place, dtype=float)
+    left = _left_part(x, force_place, derivative)
+    right = (-1) ** derivative * _left_part(1 - x, 1 - force_place, derivative)
+    shape = np.where(x <= force_place, left, right)
+    if degree == 4:
+        shape = shape - _bubble(x, derivative) * _bubble(np.asarray(force_place), 0) / BUBBLE_ENERGY
+    return shape
+
+
+def kink_shift_rate(place: float, force_place: float, degree: int) -> float:
+    """Return how g(place, force_place) changes when both places move together, per unit place."""
+    by_place = kink(min(place, force_place), max(place, force_place), degree, 1)
+    by_force = kink(max(place, force_place), min(place, force_place), degree, 1)  # g is symmetric
+    return float(by_place + by_force)
+
+
+def _left_part(x: Array, a: float, derivative: int) -> Array:
+    """Derivatives of (1 - a)^2 x^2 (3 a - x - 2 a x) / 6, valid for x <= a."""
+    factor = (1 - a) ** 2
+    if derivative == 0:
+        return factor * x**2 * (3 * a - x - 2 * a * x) / 6
+    if derivative == 1:
+        return factor * x * (2 * a - x - 2 * a * x) / 2
+    if derivative == 2:
+        return factor * (a - x - 2 * a * x)
+    return factor * (-1 - 2 * a) * np.ones_like(x)
+
+
+def _bubble(x: Array, derivative: int) -> Array:
+    if derivative == 0:
+        return 16 * x**2 * (1 - x) ** 2
+    if derivative == 1:
+        return 32 * x * (1 - x) * (1 - 2 * x)
+    if derivative == 2:
+        return 32 * (1 - 6 * x + 6 * x**2)
+    return 192 * (2 * x - 1)

@@ -1,0 +1,81 @@
+"""A line mesh and the functions on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.elements.reference import ReferenceElement, reference_element
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LineMesh:
+    """Nodes on a line and the coordinates that live on them.
+
+    Attributes
+    ----------
+    nodes
+        Rising positions, shape (elements + 1,): arc length [m] under hub support, depth fraction 0..1 under entry support.
+    degree
+        Polynomial degree of an element, 3 or 4.
+    """
+
+    nodes: Array
+    degree: int = 4
+    reference: ReferenceElement = field(init=False)
+    lengths: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "reference", reference_element(self.degree))
+        object.__setattr__(self, "lengths", np.diff(self.nodes))
+
+    @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return len(self.nodes) - 1
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates, those of the clamped end included."""
+        return self.reference.stride * self.elements + 2
+
+    @property
+    def half_bandwidth(self) -> int:
+        """Half-bandwidth of every matrix on the mesh."""
+        return self.reference.count - 1
+
+    def locate(self, position: float) -> tuple[int, float]:
+        """Return the element that holds a position and the place 0..1 within it; ends are clipped."""
+        element = int(np.searchsorted(self.nodes, position, side="right")) - 1
+        element = min(max(element, 0), self.elements - 1)
+        place = (position - self.nodes[element]) / self.lengths[element]
+        return element, min(max(float(place), 0.0), 1.0)
+
+    def row(self, position: float, derivative: int = 0) -> Array:
+        """Return the row (size,) that maps coordinates to the value, or a derivative, at a position."""
+        element, place = self.locate(position)
+        row = np.zeros(self.size)
+        first = self.reference.stride * element
+        row[first : first + self.reference.count] = self.reference.shapes(
+            place, self.lengths[element], derivative
+        )
+        return row
+
+    def evaluate(self, coordinates: Array, positions: Array, derivative: int = 0) -> Array:
+        """Return values (..., positions) of functions with coordinates (..., size), or of a derivative."""
+        where = np.searchsorted(self.nodes, positions, side="right") - 1
+        where = np.clip(where, 0, self.elements - 1)
+        size = self.lengths[where]
+        place = np.clip((positions - self.nodes[where]) / size, 0.0, 1.0)
+        shapes = self.reference.shapes(place, size, derivative)
+        columns = self.reference.stride * where + np.arange(self.reference.count)[:, None]
+        return np.einsum("...ij,ij->...j", coordinates[..., columns], shapes)
+
+
+def uniform_mesh(length: float, elements: int, degree: int) -> LineMesh:
+    """Return a mesh of equal elements from 0 to ``length``."""
+    return LineMesh(np.linspace(0.0, length, elements + 1), degree)

@@ -1,0 +1,103 @@
+"""Matrices of the tissue: the layers integrated exactly over the parts of the elements that they hold.
+
+G(z) = sum_i k_i F_i(z), with the unit matrices F_i = integral of psi psi over layer i: the only place where a foundation modulus is
+multiplied, so that dG/dk_i = F_i.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle import banded
+from fem_needle.elements.integrals import IntervalIntegrals, Kind, interval_integrals
+from fem_needle.elements.mesh import LineMesh
+from fem_needle.frames import Frame
+from fem_needle.scene import Layer
+from fem_needle.segments import Segment, inserted_segments
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Foundation:
+    """Layers on a mesh.
+
+    Attributes
+    ----------
+    layers
+        The tissue's layers.
+    mesh, frame
+        The mesh and where y lies on it.
+    """
+
+    layers: tuple[Layer, ...]
+    mesh: LineMesh
+    frame: Frame
+    _mass: IntervalIntegrals = field(init=False)
+    _drag: IntervalIntegrals = field(init=False)
+    _slip: IntervalIntegrals = field(init=False)
+
+    def __post_init__(self) -> None:
+        kinds: tuple[Kind, ...] = ("mass", "drag", "slip") if self.is_damped else ("mass",)
+        for kind in kinds:
+            object.__setattr__(self, f"_{kind}", interval_integrals(self.mesh, kind, self.frame.power))
+
+    @property
+    def is_damped(self) -> bool:
+        """Whether any layer has viscosity."""
+        return any(layer.damping > 0 for layer in self.layers)
+
+    def unit_stiffness(self, layer: int, depth: float) -> Array:
+        """Return F_i(z) [m] of one layer, band storage: the derivative of the tissue matrix by that layer's modulus."""
+        unit = tuple(1.0 if index == layer else 0.0 for index in range(len(self.layers)))
+        return self._sum(self._mass, unit, depth, self.frame.stretch(depth))
+
+    def stiffness(self, depth: float) -> Array:
+        """Return G(z) = sum k_i F_i(z)."""
+        moduli = tuple(layer.foundation_modulus for layer in self.layers)
+        return self._sum(self._mass, moduli, depth, self.frame.stretch(depth))
+
+    def stiffness_rate_product(self, coordinates: Array, depth: float) -> Array:
+        """Return dG/dz q: what the moving ends of the segments add, and the stretch."""
+        frame = self.frame
+        result = np.zeros(self.mesh.size)
+        if frame.stretch_rate:
+            result += (frame.stretch_rate / frame.stretch(depth)) * banded.multiply(
+                self.stiffness(depth), coordinates
+            )
+        for segment in inserted_segments(self.layers, depth):
+            modulus = self.layers[segment.layer].foundation_modulus * frame.stretch(depth)
+            for y, sign in ((segment.end, 1.0), (segment.start, -1.0)):
+                rate = sign * modulus * frame.position_rate(y, depth)
+                if rate:
+                    row = self.mesh.row(frame.position(y, depth))
+                    result += rate * (row @ coordinates) * row
+        return result
+
+    def damping(self, depth: float) -> tuple[Array, Array, Array] | tuple[None, None, None]:
+        """Return C, D, E of the viscosity on dw/dt at fixed y, or Nones without viscosity."""
+        if not self.is_damped:
+            return None, None, None
+        viscosities = tuple(layer.damping for layer in self.layers)
+        stretch = self.frame.stretch(depth)
+        return (
+            self._sum(self._mass, viscosities, depth, stretch),
+            self._sum(self._drag, viscosities, depth, -1.0),
+            self._sum(self._slip, viscosities, depth, 1.0 / stretch),
+        )
+
+    def _sum(
+        self, integrals: IntervalIntegrals, factors: tuple[float, ...], depth: float, scale: float
+    ) -> Array:
+        band = banded.zeros(self.mesh.size, self.mesh.half_bandwidth)
+        for segment in inserted_segments(self.layers, depth):
+            factor = factors[segment.layer]
+            if factor:
+                integrals.add(*self._ends(segment, depth), factor * scale, band)
+        return band
+
+    def _ends(self, segment: Segment, depth: float) -> tuple[float, float]:
+        return self.frame.position(segment.start, depth), self.frame.position(segment.end, depth)

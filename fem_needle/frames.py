@@ -1,0 +1,72 @@
+"""Where a position along the insertion axis lies on the mesh, and how it moves as the needle goes in.
+
+``hub``: the mesh is the needle itself, arc length s = y + (l - z). ``entry``: the mesh is stretched over the inserted part,
+depth fraction xi = y / z (physics: docs/theory.md, sections "Hub" and "Entry").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+
+class Frame(Protocol):
+    """Map from y to the mesh."""
+
+    def position(self, y: float, depth: float) -> float:
+        """Return the place on the mesh of a point at y [m]."""
+
+    def position_rate(self, y: float, depth: float) -> float:
+        """Return d(position)/dz at a fixed y."""
+
+    def stretch(self, depth: float) -> float:
+        """Return dy / d(position)."""
+
+    @property
+    def stretch_rate(self) -> float:
+        """Return d(stretch)/dz."""
+
+    @property
+    def power(self) -> int:
+        """Return p in dw/dt = psi q' - v x^p psi' q / stretch: the needle slides (0) or stretches (1) past the tissue."""
+
+
+@dataclass(frozen=True)
+class MaterialFrame:
+    """Arc length of a needle of a given length [m]."""
+
+    length: float
+    stretch_rate: float = 0.0
+    power: int = 0
+
+    def position(self, y: float, depth: float) -> float:
+        """Return s = y + (l - z) [m], kept on the needle."""
+        return min(max(y + (self.length - depth), 0.0), self.length)
+
+    def position_rate(self, y: float, depth: float) -> float:
+        """Return -1, or 0 at the tip, which moves with the mesh."""
+        return 0.0 if y >= depth else -1.0
+
+    def stretch(self, depth: float) -> float:
+        """Return 1."""
+        return 1.0
+
+
+@dataclass(frozen=True)
+class StretchedFrame:
+    """Fraction of the depth."""
+
+    stretch_rate: float = 1.0
+    power: int = 1
+
+    def position(self, y: float, depth: float) -> float:
+        """Return xi = y / z."""
+        return min(max(y / depth, 0.0), 1.0)
+
+    def position_rate(self, y: float, depth: float) -> float:
+        """Return -xi / z, or 0 at the tip."""
+        return 0.0 if y >= depth else -y / depth**2
+
+    def stretch(self, depth: float) -> float:
+        """Return z [m]."""
+        return depth

@@ -1,0 +1,64 @@
+"""The state at t = 0."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.ledger import StepEnd
+from fem_needle.loads import LoadCase, load_case
+from fem_needle.motion import DepthLaw
+from fem_needle.plant import Plant
+from fem_needle.stages import Stage, StageSolution, evaluate_stage, momentum, trivial_solution
+from fem_needle.statics import depth_derivative, solve_static, static_state
+
+Array = NDArray[np.float64]
+
+
+def initial_state(plant: Plant, law: DepthLaw) -> StepEnd:
+    """Return the state at t = 0: shape and momentum as the scene's ``[initial]`` says.
+
+    ``equilibrium``: static shape; its rate is v(0) dq/dz of the static shapes at frozen loads. ``straight`` and
+    ``tip-displaced``: at rest (no momentum).
+    """
+    scene = plant.scene
+    case = load_case(scene, law.depth(0.0), 0.0)
+    stage = evaluate_stage(plant, law.after(0.0), case)
+    if law.depth(0.0) < plant.smallest_depth:
+        return StepEnd(stage, trivial_solution(plant, stage))
+    if scene.initial.shape == "equilibrium":
+        return _moving_equilibrium(plant, law, stage)
+    if scene.initial.shape == "straight":
+        coordinates = plant.straight(*case.clamp)
+    else:
+        coordinates = _tip_displaced(plant, stage, float(scene.initial.tip_deflection or 0.0))
+    zero = np.zeros(plant.size)
+    reactions = np.zeros(stage.points.guides)
+    return StepEnd(stage, StageSolution(coordinates, zero, zero, np.concatenate([reactions, case.forces])))
+
+
+def _moving_equilibrium(plant: Plant, law: DepthLaw, stage: Stage) -> StepEnd:
+    rest = solve_static(plant, depth=law.depth(0.0), time=0.0)
+    velocities = np.zeros(plant.size)
+    if stage.instant.speed:
+        velocities = stage.instant.speed * depth_derivative(plant, rest)[0]
+    start = momentum(stage, rest.coordinates, velocities)
+    return StepEnd(stage, StageSolution(rest.coordinates, velocities, start, rest.point_forces))
+
+
+def _tip_displaced(plant: Plant, stage: Stage, tip_deflection: float) -> Array:
+    """Return the clamp's own static shape plus that of a tip force, scaled to the wanted tip."""
+    forces = np.zeros_like(stage.case.forces)
+    still = np.zeros(2)
+
+    def shape(case: LoadCase) -> Array:
+        instant = stage.instant
+        return static_state(plant, stage.operators, stage.points, case, depth=instant.depth, time=instant.time)[0]
+
+    clamped = shape(replace(stage.case, forces=forces))
+    forces[-1] = 1.0
+    pushed = shape(replace(stage.case, forces=forces, clamp=still))
+    tip = stage.points.rows[-1]
+    return clamped + (tip_deflection - float(tip @ clamped)) / float(tip @ pushed) * pushed

@@ -1,0 +1,155 @@
+"""Depth over time of a position-driven insertion, and the times at which it, or the scene around it, has a kink."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf, nextafter
+
+import numpy as np
+from scipy.optimize import brentq
+
+from fem_needle.loads import second_derivative
+from fem_needle.scene import LateralLoad, Scene, Sinusoid, Table, TipLoad, as_function
+from fem_needle.segments import interfaces
+
+MONOTONE_PIECES = 64  # per period of a sinusoid, in the search for crossings of a depth
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Time [s], depth [m], speed [m/s] and acceleration [m/s^2] of the insertion."""
+
+    time: float
+    depth: float
+    speed: float
+    acceleration: float
+
+
+@dataclass(frozen=True)
+class DepthLaw:
+    """Prescribed depth z(t).
+
+    Attributes
+    ----------
+    scene
+        The scene whose ``[insertion]`` it is.
+    rests_from
+        Time [s] from which the needle rests at ``final_depth``; infinity where it never does.
+    """
+
+    scene: Scene
+    rests_from: float
+
+    def depth(self, time: float) -> float:
+        """Return z(t) [m]."""
+        insertion = self.scene.insertion
+        if insertion.kind == "profile":
+            return float(as_function(insertion.depth).value(time))
+        if time >= self.rests_from and insertion.final_depth is not None:
+            return insertion.final_depth
+        return self._unstopped(time)
+
+    def speed(self, time: float) -> float:
+        """Return dz/dt from the right [m/s]."""
+        insertion = self.scene.insertion
+        if insertion.kind == "profile":
+            return float(as_function(insertion.depth).derivative(time))
+        if insertion.kind == "hold" or time >= self.rests_from:
+            return 0.0
+        return float(as_function(insertion.speed).value(time))
+
+    def acceleration(self, time: float) -> float:
+        """Return the second derivative of z from the right, without the jumps of speed [m/s^2]."""
+        insertion = self.scene.insertion
+        if insertion.kind == "hold" or time >= self.rests_from:
+            return 0.0
+        if insertion.kind == "speed":
+            return float(as_function(insertion.speed).derivative(time))
+        return second_derivative(as_function(insertion.depth), time)
+
+    def after(self, time: float) -> Instant:
+        """Return the motion just after a time."""
+        return Instant(time, self.depth(time), self.speed(time), self.acceleration(time))
+
+    def before(self, time: float) -> Instant:
+        """Return the motion just before a time: at a kink, its left side."""
+        earlier = nextafter(time, -inf)
+        return Instant(time, self.depth(time), self.speed(earlier), self.acceleration(earlier))
+
+    def kinks(self, duration: float) -> tuple[float, ...]:
+        """Return the times in (0, duration) where the speed or its slope jumps [s]."""
+        insertion = self.scene.insertion
+        source = {"hold": 0.0, "speed": insertion.speed, "profile": insertion.depth}[insertion.kind]
+        times = {time for time in as_function(source).breakpoints if time < self.rests_from}
+        return tuple(sorted(time for time in times | {self.rests_from} if 0 < time < duration))
+
+    def crossings(self, level: float, duration: float) -> tuple[float, ...]:
+        """Return the times in (0, duration) at which the depth passes a level [m]."""
+        return tuple(
+            time for time in _crossings(self.depth, self._monotone_pieces(duration), level) if 0 < time < duration
+        )
+
+    def fastest(self, duration: float) -> float:
+        """Return the largest speed in either direction [m/s]."""
+        times = self._monotone_pieces(duration)
+        middles = [0.5 * (first + second) for first, second in pairwise(times)]
+        return max(abs(self.speed(time)) for time in [*times, *middles])
+
+    def _unstopped(self, time: float) -> float:
+        insertion = self.scene.insertion
+        if insertion.kind == "hold":
+            return insertion.first_depth
+        return insertion.first_depth + float(as_function(insertion.speed).integral(time))
+
+    def _monotone_pieces(self, duration: float) -> list[float]:
+        """Times between which the depth rises or falls throughout."""
+        insertion = self.scene.insertion
+        marks = {0.0, duration, *self.kinks(duration)}
+        source = insertion.depth if insertion.kind == "profile" else insertion.speed
+        if isinstance(source, Table):
+            marks |= {float(time) for time in source.zeros(duration)}
+        if isinstance(source, Sinusoid):
+            count = int(np.ceil(duration * source.frequency * MONOTONE_PIECES)) + 1
+            marks |= set(np.linspace(0.0, duration, count + 1).tolist())
+        return sorted(time for time in marks if 0 <= time <= duration)
+
+
+def depth_law(scene: Scene) -> DepthLaw:
+    """Return the depth law of a position-driven scene."""
+    rests = scene.insertion.end_time if scene.insertion.final_depth is not None else None
+    return DepthLaw(scene, inf if rests is None else rests)
+
+
+def run_duration(scene: Scene) -> float:
+    """Return how long the run lasts [s]: as the scene says, else until the insertion ends."""
+    duration = scene.run.duration
+    return float(scene.insertion.end_time or 0.0) if duration is None else duration
+
+
+def landing_times(scene: Scene, law: DepthLaw, duration: float, smallest_depth: float) -> tuple[float, ...]:
+    """Return every time in (0, duration) on which a step must land: kinks of motion, loads and layers."""
+    sources = [scene.support.hub_deflection, scene.support.hub_angle, scene.tissue.stiffness_factor]
+    sources += [load.force for load in scene.loads if isinstance(load, LateralLoad)]
+    sources += [load.force for load in scene.loads if isinstance(load, TipLoad) and load.force is not None]
+    times = set(law.kinks(duration))
+    for source in sources:
+        times |= {time for time in as_function(source).breakpoints if 0 < time < duration}
+    levels = [level for level in interfaces(scene.tissue.layers) if level > 0]
+    if smallest_depth:
+        levels.append(smallest_depth)
+    for level in levels:
+        times |= set(law.crossings(level, duration))
+    return tuple(sorted(times))
+
+
+def _crossings(depth: Callable[[float], float], times: list[float], level: float) -> Iterator[float]:
+    for first, second in pairwise(times):
+        start, end = depth(first) - level, depth(second) - level
+        if start == 0.0:
+            yield first
+        elif start * end < 0:
+            yield float(brentq(lambda time: depth(time) - level, first, second, xtol=1e-15))
+        elif end == 0.0:
+            yield second

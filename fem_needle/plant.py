@@ -1,0 +1,130 @@
+"""The protocol that every model of a needle meets: integrators, statics and studies know no mesh.
+
+A plant is a linear system whose matrices move with the depth z(t). With coordinates q and v = dz/dt,
+
+    kinetic energy    T = 1/2 q'.M q' + v q'.S q + 1/2 v^2 q.R q
+    potential         U = 1/2 q.(K + m G) q - P.(N q) - 1/2 P.B P
+    dissipation       c = q'.C q' + 2 v q'.D q + v^2 q.E q                (power lost in the tissue)
+
+where P are the forces at points (guides, lateral loads, tip), N the rows that give the deflection there and B the flexibility of the
+kink that the model's shapes miss inside an element. M, S, R, K, G, C, D, E, N, B depend on z; m(t) is the stiffness factor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Operators:
+    """The matrices of a plant at one depth and time, in band storage; None where a term is absent.
+
+    Attributes
+    ----------
+    mass, convection, centrifugal
+        M [kg], S [kg/m], R [kg/m^2] (times the coordinates' own units).
+    bending, tissue
+        K and m(t) G.
+    damping, drag, slip
+        C, D, E.
+    tissue_rate
+        dm/dt G, of a tissue that swells.
+    """
+
+    mass: Array
+    bending: Array
+    tissue: Array
+    convection: Array | None = None
+    centrifugal: Array | None = None
+    damping: Array | None = None
+    drag: Array | None = None
+    slip: Array | None = None
+    tissue_rate: Array | None = None
+
+    @property
+    def stiffness(self) -> Array:
+        """Bending and tissue together."""
+        return self.bending + self.tissue
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Where point forces act: guides first, then lateral loads, the tip last.
+
+    Attributes
+    ----------
+    rows, row_rates
+        N and dN/dz, shape (points, size).
+    flexibility, flexibility_rate
+        B and dB/dz, shape (points, points) [m/N] and [1/N].
+    guides
+        How many of the points are guides.
+    guide_compliance
+        1 / stiffness of each guide [m/N], 0 where it is rigid.
+    """
+
+    rows: Array
+    row_rates: Array
+    flexibility: Array
+    flexibility_rate: Array
+    guides: int
+    guide_compliance: Array
+
+    def deflections(self, coordinates: Array, forces: Array) -> Array:
+        """Return the deflection at each point [m] under the forces (points,) [N]."""
+        return self.rows @ coordinates + self.flexibility @ forces
+
+
+class Plant(Protocol):
+    """What integrators, statics and studies may ask of a model.
+
+    Attributes
+    ----------
+    scene
+        The scene that it models.
+    size
+        Number of coordinates.
+    prescribed
+        How many leading coordinates are prescribed (the clamped end), 0 or 2.
+    deflection_at_one
+        Coordinates of the function 1: their product with a force vector is the total force.
+    smallest_depth
+        Below this depth [m] the plant has no inserted part and is straight; 0 where it always has one.
+    """
+
+    scene: Scene
+    size: int
+    prescribed: int
+    deflection_at_one: Array
+    smallest_depth: float
+
+    def operators(self, depth: float, time: float) -> Operators:
+        """Return the matrices."""
+
+    def points(self, depth: float) -> Points:
+        """Return where point forces act."""
+
+    def straight(self, deflection: float, angle: float) -> Array:
+        """Return the coordinates of a straight needle, clamped with a deflection [m] and an angle [rad]."""
+
+    def stiffness_rate_product(self, coordinates: Array, depth: float, time: float) -> Array:
+        """Return d(K + m G)/dz q at a fixed time."""
+
+    def kinetic_rate(self, velocities: Array, coordinates: Array, depth: float, speed: float) -> float:
+        """Return dT/dz [N] at fixed coordinates, velocities and speed."""
+
+    def deflection(
+        self, coordinates: Array, forces: Array, depth: float, arc_length: Array, derivative: int = 0
+    ) -> Array:
+        """Return deflections, or derivatives, at stations from the hub (0) to the tip (l)."""
+
+    def describe(self) -> dict[str, int | float | str]:
+        """Return what ``summary.json`` says of the model: kind, elements or modes."""

@@ -1,0 +1,198 @@
+"""Static equilibrium of any plant, its derivative by depth, and the check that all forces sum to zero."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle import banded
+from fem_needle.errors import ComputationError
+from fem_needle.loads import LoadCase, load_case
+from fem_needle.plant import Operators, Plant, Points
+
+Array = NDArray[np.float64]
+
+FORCE_SUM_TOLERANCE = 1e-6  # of the largest single force: far above round-off, far below a wrong sign
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A needle at rest under the loads of one instant.
+
+    Attributes
+    ----------
+    plant
+        The model.
+    depth, time
+        Depth [m] and time [s].
+    coordinates
+        The plant's coordinates q.
+    point_forces
+        Forces on the needle at guides, lateral loads and tip [N].
+    guide_forces
+        Those of the guides [N].
+    hub_force, hub_moment
+        What the clamp exerts on the needle [N], [N m]; under ``entry`` the clamp at the surface.
+    tissue_force
+        Total lateral force of the tissue on the needle [N].
+    """
+
+    plant: Plant
+    depth: float
+    time: float
+    coordinates: Array
+    point_forces: Array
+    guide_forces: Array
+    hub_force: float
+    hub_moment: float
+    tissue_force: float
+
+    @property
+    def tip_deflection(self) -> float:
+        """Deflection of the tip [m]."""
+        return float(self.deflection(np.array([self.plant.scene.needle.length]))[0])
+
+    def deflection(self, arc_length: Array, derivative: int = 0) -> Array:
+        """Return the deflection [m] (or a derivative by arc length) at stations from the hub, 0, to the tip, l [m]."""
+        return self.plant.deflection(self.coordinates, self.point_forces, self.depth, arc_length, derivative)
+
+
+def solve_static(plant: Plant, *, depth: float, time: float = 0.0) -> Equilibrium:
+    """Return the equilibrium at a depth under the loads of a time.
+
+    Parameters
+    ----------
+    plant
+        Any model of a needle.
+    depth
+        Inserted length z [m], 0 to the needle's length.
+    time
+        Instant [s] at which loads, hub motion and stiffness factor are taken.
+
+    Raises
+    ------
+    ComputationError
+        If the equations have no solution or the forces do not sum to zero.
+    """
+    case = load_case(plant.scene, depth, time)
+    if depth < plant.smallest_depth:
+        return _straight(plant, depth, time, case)
+    operators, points = plant.operators(depth, time), plant.points(depth)
+    coordinates, forces = static_state(plant, operators, points, case, depth=depth, time=time)
+    return check_force_sum(equilibrium(plant, depth, time, operators, points, coordinates, forces))
+
+
+def static_state(
+    plant: Plant, operators: Operators, points: Points, case: LoadCase, *, depth: float, time: float
+) -> tuple[Array, Array]:
+    """Return coordinates and point forces of the equilibrium under a load case; depth and time are for messages."""
+    guides, known = points.guides, known_coordinates(plant, case)
+    force = points.rows[guides:].T @ case.forces - banded.multiply(operators.stiffness, known)
+    gap = points.rows[:guides] @ known + points.flexibility[:guides, guides:] @ case.forces
+    try:
+        free, guide_forces = solve_guided(plant, operators.stiffness, points, force, gap)
+    except (banded.SingularMatrixError, np.linalg.LinAlgError) as error:
+        raise ComputationError(
+            f"no static solution at time {time:g} s, depth {depth:g} m: {error}; check stiffnesses and use fewer elements"
+        ) from error
+    return known + free, np.concatenate([guide_forces, case.forces])
+
+
+def known_coordinates(plant: Plant, case: LoadCase) -> Array:
+    """Return the coordinates with the clamp's values in place and zero elsewhere."""
+    known = np.zeros(plant.size)
+    known[: plant.prescribed] = case.clamp[: plant.prescribed]
+    return known
+
+
+def solve_guided(
+    plant: Plant, stiffness: Array, points: Points, force: Array, gap: Array
+) -> tuple[Array, Array]:
+    """Solve K x = force + N.R for the free coordinates, with N x + (B + compliance) R = -gap at the guides.
+
+    Returns x (zero at the clamp) and the guide forces R [N] on the needle.
+    """
+    clamped, guides = plant.prescribed, points.guides
+    rows = points.rows[:guides, clamped:]
+    answers = banded.Factorization(banded.trailing(stiffness, clamped)).solve(
+        np.column_stack([force[clamped:], rows.T])
+    )
+    result = np.zeros(plant.size)
+    result[clamped:] = answers[:, 0]
+    if not guides:
+        return result, np.zeros(0)
+    reached = answers[:, 1:]
+    compliance = rows @ reached + points.flexibility[:guides, :guides] + np.diag(points.guide_compliance)
+    reactions = -np.linalg.solve(compliance, rows @ answers[:, 0] + gap)
+    result[clamped:] += reached @ reactions
+    return result, reactions
+
+
+def equilibrium(
+    plant: Plant,
+    depth: float,
+    time: float,
+    operators: Operators,
+    points: Points,
+    coordinates: Array,
+    forces: Array,
+) -> Equilibrium:
+    """Collect a static state and the reactions that follow from it."""
+    residual = banded.multiply(operators.stiffness, coordinates) - points.rows.T @ forces
+    clamp = np.zeros(2)
+    clamp[: plant.prescribed] = residual[: plant.prescribed]
+    tissue = -plant.deflection_at_one @ banded.multiply(operators.tissue, coordinates)
+    return Equilibrium(
+        plant,
+        depth,
+        time,
+        coordinates,
+        forces,
+        forces[: points.guides],
+        float(clamp[0]),
+        float(clamp[1]),
+        float(tissue),
+    )
+
+
+def check_force_sum(rest: Equilibrium) -> Equilibrium:
+    """Return the state if support, guides, loads and tissue balance.
+
+    Raises
+    ------
+    ComputationError
+        If their sum exceeds ``FORCE_SUM_TOLERANCE`` of the largest of them.
+    """
+    if not rest.plant.prescribed:
+        return rest  # without a clamp in the coordinates there is no support force to add up
+    forces = [rest.hub_force, rest.tissue_force, *rest.point_forces]
+    largest = max(abs(force) for force in forces)
+    if abs(sum(forces)) > FORCE_SUM_TOLERANCE * largest:
+        raise ComputationError(
+            f"forces do not balance at time {rest.time:g} s, depth {rest.depth:g} m: their sum is {sum(forces):.3g} N, the largest "
+            f"{largest:.3g} N; round-off: use fewer elements"
+        )
+    return rest
+
+
+def depth_derivative(plant: Plant, rest: Equilibrium) -> tuple[Array, Array]:
+    """Return dq/dz and the guides' dR/dz of the static solution at frozen loads.
+
+    K dq/dz = N.dR/dz + dN/dz.P - d(K + m G)/dz q, the guides still holding.
+    """
+    if rest.depth < plant.smallest_depth:
+        return np.zeros(plant.size), np.zeros(0)
+    operators, points = plant.operators(rest.depth, rest.time), plant.points(rest.depth)
+    moved = plant.stiffness_rate_product(rest.coordinates, rest.depth, rest.time)
+    force = points.row_rates.T @ rest.point_forces - moved
+    guides = points.guides
+    drift = points.row_rates[:guides] @ rest.coordinates + points.flexibility_rate[:guides] @ rest.point_forces
+    return solve_guided(plant, operators.stiffness, points, force, drift)
+
+
+def _straight(plant: Plant, depth: float, time: float, case: LoadCase) -> Equilibrium:
+    """An ``entry`` needle that is hardly inserted is straight; the surface carries the tip force."""
+    tip = float(case.forces[-1])
+    return Equilibrium(plant, depth, time, np.zeros(plant.size), case.forces, np.zeros(0), -tip, 0.0, 0.0)

@@ -1,0 +1,195 @@
+"""How a needle gets from one time to the next: with inertia, creeping without it, or through equilibria.
+
+All three return the same thing, a `Step`, so that the loop over time, the ledger and the output know no difference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.collocation import Collocation, collocation
+from fem_needle.ledger import StepEnd
+from fem_needle.loads import load_case
+from fem_needle.motion import DepthLaw
+from fem_needle.plant import Operators, Plant
+from fem_needle.stages import (
+    Stage,
+    StageSolution,
+    StepSystem,
+    evaluate_stage,
+    factor_step,
+    momentum,
+    solve_step,
+    trivial_solution,
+    velocities_of,
+)
+from fem_needle.statics import static_state
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One smooth step.
+
+    Attributes
+    ----------
+    method
+        Nodes and weights of the stages.
+    length
+        Duration [s].
+    ends
+        State just after the start and just before the end.
+    stages, solutions
+        The plant and its state at the two nodes.
+    system
+        The factored matrix, for the next step where nothing moves.
+    """
+
+    method: Collocation
+    length: float
+    ends: tuple[StepEnd, StepEnd]
+    stages: tuple[Stage, Stage]
+    solutions: tuple[StageSolution, StageSolution]
+    system: StepSystem | None = None
+
+
+class Stepper(Protocol):
+    """Advance a state over one smooth step."""
+
+    inertia: bool
+
+    def start(self, law: DepthLaw, time: float, until: float, before: StepEnd) -> StepEnd:
+        """Return the state just after a time, given the state just before."""
+
+    def advance(self, law: DepthLaw, start: StepEnd, until: float, last: Step | None) -> Step:
+        """Return the step from a state to a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicStepper:
+    """Collocation in momentum form (`stages`), with or without inertia.
+
+    Attributes
+    ----------
+    plant
+        The model; a `Massless` one creeps.
+    method
+        Collocation method.
+    inertia
+        Whether the plant has any.
+    """
+
+    plant: Plant
+    method: Collocation
+    inertia: bool = True
+
+    def start(self, law: DepthLaw, time: float, until: float, before: StepEnd) -> StepEnd:
+        """Carry coordinates and momentum over a possible jump of speed or of the hub's velocity."""
+        middle = law.depth(0.5 * (time + until))
+        stage = evaluate_stage(self.plant, law.after(time), load_case(self.plant.scene, middle, time), before.stage)
+        solution = before.solution
+        return self._state(stage, solution.coordinates, solution.momentum, solution.forces)
+
+    def advance(self, law: DepthLaw, start: StepEnd, until: float, last: Step | None) -> Step:
+        """Solve the stages and extrapolate their polynomial to the end."""
+        time = start.stage.instant.time
+        length, middle = until - time, law.depth(0.5 * (time + until))
+        stages = self._stages(law, start.stage, time, length)
+        system = _reusable(last, stages, length) or factor_step(self.plant, stages, self.method, length)
+        begin = start.solution
+        solutions = solve_step(self.plant, stages, self.method, length, system, begin.coordinates, begin.momentum)
+        weights = self.method.end
+        end_coordinates, end_momentum = (
+            getattr(begin, name) + sum(w * (getattr(s, name) - getattr(begin, name)) for w, s in zip(weights, solutions, strict=True))
+            for name in ("coordinates", "momentum")
+        )
+        case = load_case(self.plant.scene, middle, np.nextafter(until, time))
+        stage = evaluate_stage(self.plant, law.before(until), case, stages[1])
+        end_coordinates[: self.plant.prescribed] = case.clamp[: self.plant.prescribed]
+        reactions = sum(w * s.forces for w, s in zip(self.method.end_value, solutions, strict=True))
+        guides = stage.points.guides
+        forces = np.concatenate([reactions[:guides], case.forces])
+        end = self._state(stage, end_coordinates, end_momentum, forces)
+        return Step(self.method, length, (start, end), stages, solutions, system)
+
+    def _stages(self, law: DepthLaw, earlier: Stage, time: float, length: float) -> tuple[Stage, Stage]:
+        found = []
+        for node in self.method.nodes:
+            instant = law.before(time + node * length) if node == 1.0 else law.after(time + node * length)
+            case = load_case(self.plant.scene, instant.depth, instant.time)
+            earlier = evaluate_stage(self.plant, instant, case, earlier)
+            found.append(earlier)
+        return found[0], found[1]
+
+    def _state(self, stage: Stage, coordinates: Array, start_momentum: Array, forces: Array) -> StepEnd:
+        if not self.inertia:
+            return StepEnd(stage, StageSolution(coordinates, np.zeros_like(coordinates), start_momentum, forces))
+        velocities = velocities_of(self.plant, stage, coordinates, start_momentum)
+        full = momentum(stage, coordinates, velocities)
+        return StepEnd(stage, StageSolution(coordinates, velocities, full, forces))
+
+
+def _reusable(last: Step | None, stages: tuple[Stage, Stage], length: float) -> StepSystem | None:
+    """Return the last step's factors where neither matrices nor step have changed."""
+    if last is None or last.system is None or abs(last.length - length) > 1e-12 * length:
+        return None
+    same = all(new.operators is old.operators for new, old in zip(stages, last.stages, strict=True))
+    still = not any(stage.instant.speed for stage in (*stages, *last.stages))
+    return last.system if same and still else None
+
+
+class Massless:
+    """A plant whose inertia is left out; everything else is the plant's own."""
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._plant, name)
+
+    def operators(self, depth: float, time: float) -> Operators:
+        """Return the matrices with M = S = R = 0."""
+        operators = self._plant.operators(depth, time)
+        return replace(operators, mass=np.zeros_like(operators.mass), convection=None, centrifugal=None)
+
+    def kinetic_rate(self, velocities: Array, coordinates: Array, depth: float, speed: float) -> float:
+        """Return 0."""
+        return 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class StaticStepper:
+    """A sequence of equilibria; the nodes between serve the works."""
+
+    plant: Plant
+    inertia: bool = False
+    method: Collocation = collocation(1.0)
+
+    def start(self, law: DepthLaw, time: float, until: float, before: StepEnd) -> StepEnd:
+        """Return the equilibrium just after a time."""
+        return self._rest(law, law.after(time).time, law.depth(0.5 * (time + until)), after=True)
+
+    def advance(self, law: DepthLaw, start: StepEnd, until: float, last: Step | None) -> Step:
+        """Return the equilibria at the nodes and at the end."""
+        time = start.stage.instant.time
+        length, middle = until - time, law.depth(0.5 * (time + until))
+        first, second = (self._rest(law, time + node * length, middle, after=True) for node in self.method.nodes)
+        end = self._rest(law, until, middle, after=False)
+        return Step(self.method, length, (start, end), (first.stage, second.stage), (first.solution, second.solution))
+
+    def _rest(self, law: DepthLaw, time: float, layer_depth: float, *, after: bool) -> StepEnd:
+        instant = law.after(time) if after else law.before(time)
+        case = load_case(self.plant.scene, layer_depth, time if after else np.nextafter(time, -np.inf))
+        stage = evaluate_stage(self.plant, instant, case)
+        if instant.depth < self.plant.smallest_depth:
+            return StepEnd(stage, trivial_solution(self.plant, stage))
+        coordinates, forces = static_state(
+            self.plant, stage.operators, stage.points, case, depth=instant.depth, time=instant.time
+        )
+        zero = np.zeros(self.plant.size)
+        return StepEnd(stage, StageSolution(coordinates, zero, zero, forces))

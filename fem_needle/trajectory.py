@@ -1,0 +1,177 @@
+"""The result of a run: arrays over time, SI, with the scene and what was computed how."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from fem_needle.plant import Plant
+from fem_needle.samples import Sample
+from fem_needle.scene import Scene
+
+Array = NDArray[np.float64]
+
+# Variables of `series.nc` over time: unit and meaning. The order is that of the file.
+VARIABLES: dict[str, tuple[str, str]] = {
+    "depth": ("m", "inserted length"),
+    "speed": ("m/s", "insertion speed, positive going in"),
+    "tip_deflection": ("m", "lateral displacement of the tip"),
+    "tip_angle": ("rad", "slope of the needle at the tip"),
+    "push_force": ("N", "axial force that the insertion needs, positive going in"),
+    "friction_force": ("N", "axial friction of the shaft, against the motion; 0 at rest"),
+    "tissue_force": ("N", "total lateral force of the tissue on the needle"),
+    "hub_force": ("N", "lateral force of the clamp on the needle"),
+    "hub_moment": ("N m", "moment of the clamp on the needle"),
+    "kinetic_energy": ("J", "lateral kinetic energy"),
+    "bending_energy": ("J", "bending energy"),
+    "tissue_energy": ("J", "energy of tissue and guide springs"),
+    "guide_energy": ("J", "energy of the guide springs alone, a part of tissue_energy"),
+    "load_work": ("J", "work of tip and lateral forces since the start"),
+    "hub_work": ("J", "work of the moving hub since the start"),
+    "tissue_work": ("J", "work of the swelling tissue since the start"),
+    "tissue_dissipation": ("J", "energy lost in the tissue's viscosity since the start"),
+    "boundary_energy": ("J", "-integral of the axial force A times speed since the start"),
+    "energy_residual": ("J", "lateral energy minus its start value and all lateral works"),
+    "push_work": ("J", "work of the push since the start"),
+    "friction_dissipation": ("J", "energy lost in shaft friction since the start"),
+    "cutting_work": ("J", "work spent on cutting since the start"),
+    "axial_kinetic_energy": ("J", "kinetic energy of the insertion"),
+}
+
+_FROM_SAMPLES = tuple(
+    name for name in VARIABLES if name not in {"tip_deflection", "tip_angle", "energy_residual", "push_work"}
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A run, sample by sample.
+
+    Every variable of `VARIABLES` is an attribute, shape (nt,), e.g. ``run.tip_deflection``.
+
+    Attributes
+    ----------
+    scene
+        The scene that was run.
+    time
+        Times of the samples [s], shape (nt,).
+    series
+        The variables by name.
+    guide_force
+        Force of each guide on the needle [N], shape (nt, guides).
+    arc_length
+        Stations from the hub, 0, to the tip, l [m], shape (n,).
+    station_deflection
+        Deflection at the stations [m], shape (nt, n).
+    summary
+        What ``summary.json`` holds.
+    plant, coordinates, point_forces
+        The model and its state at each sample; None in a run that was loaded.
+    """
+
+    scene: Scene
+    time: Array
+    series: dict[str, Array]
+    guide_force: Array
+    arc_length: Array
+    station_deflection: Array
+    summary: dict[str, Any] = field(default_factory=dict)
+    plant: Plant | None = None
+    coordinates: Array | None = None
+    point_forces: Array | None = None
+
+    def __getattr__(self, name: str) -> Array:
+        if name in VARIABLES and "series" in self.__dict__:
+            return self.series[name]
+        raise AttributeError(f"a trajectory has no {name!r}; its variables are {', '.join(VARIABLES)}")
+
+    def deflection(self, arc_length: Array | None = None, derivative: int = 0) -> Array:
+        """Return the deflection [m], or a derivative by arc length, at stations, shape (nt, n).
+
+        Without stations: at those of the run. From the model itself, or, in a loaded run, by a cubic spline through the
+        stored stations of the part that bends.
+        """
+        if arc_length is None and derivative == 0:
+            return self.station_deflection
+        stations = self.arc_length if arc_length is None else np.asarray(arc_length, dtype=float)
+        if self.plant is None or self.coordinates is None or self.point_forces is None:
+            return np.stack([self._from_stations(row, stations, derivative) for row in range(len(self.time))])
+        return np.stack(
+            [
+                self.plant.deflection(coordinates, forces, depth, stations, derivative)
+                for coordinates, forces, depth in zip(self.coordinates, self.point_forces, self.depth, strict=True)
+            ]
+        )
+
+    def _from_stations(self, row: int, stations: Array, derivative: int) -> Array:
+        values, start = self.station_deflection[row], 0.0
+        if self.scene.support.kind == "entry":
+            start = self.scene.needle.length - float(self.depth[row])
+        bent = self.arc_length > start
+        if np.count_nonzero(bent) < 2:
+            return np.zeros(stations.shape)
+        knots, known = self.arc_length[bent], values[bent]
+        clamp: Any = "not-a-knot"
+        if start > 0:
+            knots, known, clamp = np.append(start, knots), np.append(0.0, known), ((1, 0.0), (2, 0.0))
+        return np.where(stations >= start, CubicSpline(knots, known, bc_type=clamp)(stations, derivative), 0.0)
+
+    def save(self, folder: str | Path, *, force: bool = False) -> Path:
+        """Write a run folder (docs/contract.md); refuse an existing one unless ``force``."""
+        from fem_needle.run_folder import save_run  # noqa: PLC0415 (the folder's room is above this one)
+
+        return save_run(self, Path(folder), force=force)
+
+    @staticmethod
+    def load(folder: str | Path) -> Trajectory:
+        """Read a run folder."""
+        from fem_needle.run_folder import load_run  # noqa: PLC0415
+
+        return load_run(Path(folder))
+
+
+def trajectory_from_samples(plant: Plant, samples: Sequence[Sample], summary: dict[str, Any]) -> Trajectory:
+    """Collect samples, in order of time, into a trajectory."""
+    scene, length = plant.scene, plant.scene.needle.length
+    stations = np.linspace(0.0, length, scene.numerics.output_points)
+    shapes = np.stack([plant.deflection(s.coordinates, s.point_forces, s.depth, stations) for s in samples])
+    series = {name: np.array([getattr(s, name) for s in samples]) for name in _FROM_SAMPLES}
+    tip = np.array([length])
+    series["tip_deflection"] = shapes[:, -1].copy()
+    series["tip_angle"] = np.array([plant.deflection(s.coordinates, s.point_forces, s.depth, tip, 1)[0] for s in samples])
+    energy = np.array([s.lateral_energy for s in samples])
+    gained = series["load_work"] + series["hub_work"] + series["tissue_work"] + series["boundary_energy"]
+    series["energy_residual"] = energy - energy[0] - (gained - series["tissue_dissipation"])
+    axial = series["axial_kinetic_energy"] - series["axial_kinetic_energy"][0]
+    series["push_work"] = axial + series["friction_dissipation"] + series["cutting_work"] + series["boundary_energy"]
+    return Trajectory(
+        scene=scene,
+        time=np.array([s.time for s in samples]),
+        series={name: series[name] for name in VARIABLES},
+        guide_force=np.stack([s.guide_force for s in samples]),
+        arc_length=stations,
+        station_deflection=shapes,
+        summary=summary,
+        plant=plant,
+        coordinates=np.stack([s.coordinates for s in samples]),
+        point_forces=np.stack([s.point_forces for s in samples]),
+    )
+
+
+def summary_of(run: Trajectory) -> dict[str, Any]:
+    """Return the figures that follow from the series alone."""
+    energy = run.kinetic_energy + run.bending_energy + run.tissue_energy
+    largest = float(np.max(np.abs(energy)))
+    residual = float(np.max(np.abs(run.energy_residual)))
+    return {
+        "final_depth": float(run.depth[-1]),
+        "final_tip_deflection": float(run.tip_deflection[-1]),
+        "max_abs_tip_deflection": float(np.max(np.abs(run.tip_deflection))),
+        "relative_energy_residual": residual / largest if largest else 0.0,
+    }
