@@ -14,9 +14,7 @@ from fem_needle.scene import Insertion, Layer, Needle, Run, Scene, Support, TipL
 _LONG_ENOUGH = 40.0  # exp(-40) = 4e-18: a needle of this many 1 / lambda is infinite to round-off
 
 
-def _scene(
-    length: float, bending_stiffness: float, foundation_modulus: float, support: Support, **parts: object
-) -> Scene:
+def _scene(length: float, bending_stiffness: float, foundation_modulus: float, support: Support, **parts: object) -> Scene:
     """Scene of a needle held with its whole length in homogeneous tissue."""
     return Scene(
         needle=Needle(length=length, bending_stiffness=bending_stiffness, mass_per_length=0.01),

@@ -86,9 +86,7 @@ def transition_matrices(relative_modulus: ArrayLike, distance: ArrayLike) -> NDA
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def decaying_states(
-    relative_modulus: ArrayLike, state: ArrayLike, distance: ArrayLike
-) -> NDArray[np.float64]:
+def decaying_states(relative_modulus: ArrayLike, state: ArrayLike, distance: ArrayLike) -> NDArray[np.float64]:
     """State at x of the solution that decays away from a point with known w and w'.
 
     w(x) = Re(C exp(-(1 + i) lambda x)), C = w(0) + i (w(0) + w'(0) / lambda): the two decaying solutions of a

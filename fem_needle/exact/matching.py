@@ -204,9 +204,7 @@ def _scale(problem: BeamProblem) -> NDArray[np.float64]:
     return max(1.0 / span, wave) ** np.arange(4.0)
 
 
-def _solve_banded(
-    rows: NDArray[np.float64], sides: NDArray[np.float64], scale: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _solve_banded(rows: NDArray[np.float64], sides: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
     """Solve the matching system for the states, shape (m, 4); unknowns scaled, equations of unit size."""
     count = sides.size
     row = np.arange(count)
@@ -240,9 +238,7 @@ def _cut(problem: BeamProblem) -> Steps:
     modulus = problem.foundation_modulus / problem.bending_stiffness
     pieces = [
         _steps_of_piece(right - left, float(lam))
-        for left, right, lam in zip(
-            problem.breaks[:-1], problem.breaks[1:], characteristic_number(modulus), strict=True
-        )
+        for left, right, lam in zip(problem.breaks[:-1], problem.breaks[1:], characteristic_number(modulus), strict=True)
     ]
     counts = [length.size for length, _ in pieces]
     piece = np.repeat(np.arange(len(pieces)), counts)

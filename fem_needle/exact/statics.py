@@ -215,11 +215,7 @@ def _tip_load_force(load: TipLoad, scene: Scene, depth: float, time: float) -> f
 
 def _lateral_forces(scene: Scene, time: float) -> list[tuple[float, float]]:
     """Position [m] and value [N] of the lateral forces."""
-    return [
-        (load.position, as_function(load.force).value(time))
-        for load in scene.loads
-        if isinstance(load, LateralLoad)
-    ]
+    return [(load.position, as_function(load.force).value(time)) for load in scene.loads if isinstance(load, LateralLoad)]
 
 
 def _refuse_impossible(scene: Scene, depth: float) -> None:

@@ -26,9 +26,7 @@ def test_clamped_tip_force_to_round_off(modulus):
 @pytest.mark.parametrize("modulus", [0.0, 1.0, 520.0, 5e4, 1e9])
 def test_piecewise_solution_of_clamped_tip_force(modulus):
     case = ClampedTipForce(bending_stiffness=0.0256, foundation_modulus=modulus, length=0.1, force=0.1)
-    assert exact_static(case.scene, case.length).tip_deflection == pytest.approx(
-        case.tip_deflection, rel=1e-12
-    )
+    assert exact_static(case.scene, case.length).tip_deflection == pytest.approx(case.tip_deflection, rel=1e-12)
 
 
 def test_bench_value():

@@ -26,8 +26,7 @@ def mp_states(problem):
     stiffness = mp.mpf(problem.bending_stiffness)
     breaks = [mp.mpf(float(y)) for y in problem.breaks]
     carries = [
-        mp_transition(mp.mpf(float(k)) / stiffness, breaks[i + 1] - breaks[i])
-        for i, k in enumerate(problem.foundation_modulus)
+        mp_transition(mp.mpf(float(k)) / stiffness, breaks[i + 1] - breaks[i]) for i, k in enumerate(problem.foundation_modulus)
     ]
     matrix, right = mp.zeros(4 * count), mp.zeros(4 * count, 1)
     matrix[0, 0] = matrix[1, 1] = 1
@@ -82,9 +81,7 @@ def test_short_piece(gap, springs):
     stiffness = np.array([0.0, *springs, 0.0])
     force = np.array([0.0, 0.3, -0.2, 0.1])
     # the shear between two pins at a gap g is a moment over g: nothing is lost
-    assert_deflection_and_sections(
-        BeamProblem(0.02, breaks, np.array([0.0, 5e4, 5e4]), force, stiffness, 1e-3)
-    )
+    assert_deflection_and_sections(BeamProblem(0.02, breaks, np.array([0.0, 5e4, 5e4]), force, stiffness, 1e-3))
 
 
 @pytest.mark.parametrize("moduli", [(1.0, 1e6), (1e6, 1.0), (0.0, 1e8)])

@@ -53,9 +53,7 @@ FULL = scene_of(
 )
 
 
-@pytest.mark.parametrize(
-    "scene", [FULL, scene_of("entry", loads=[TipLoad(force=0.1)]), scene_of(loads=[TipLoad(force=0.2)])]
-)
+@pytest.mark.parametrize("scene", [FULL, scene_of("entry", loads=[TipLoad(force=0.1)]), scene_of(loads=[TipLoad(force=0.2)])])
 @pytest.mark.parametrize("depth", [1e-4, 0.03, 0.055, 0.1, 0.15])
 def test_forces_and_moments_balance(scene, depth):
     rest = exact_static(scene, depth)
@@ -72,8 +70,7 @@ def test_forces_and_moments_balance(scene, depth):
             )[0]
     points = [(load.position - depth - clamp, load.force) for load in scene.loads if load.kind == "lateral"]
     points += [
-        (guide.position - depth - clamp, force)
-        for guide, force in zip(scene.support.guides, rest.guide_forces, strict=True)
+        (guide.position - depth - clamp, force) for guide, force in zip(scene.support.guides, rest.guide_forces, strict=True)
     ]
     forces = [rest.tip_force, rest.tissue_force, rest.hub_force, *(force for _, force in points)]
     assert sum(forces) == pytest.approx(0.0, abs=1e-12 * max(map(abs, forces)))
@@ -97,9 +94,7 @@ def test_clamp_and_tip():
     rest = exact_static(FULL, 0.1)
     assert rest.deflection(0.0) == pytest.approx(1e-3, rel=1e-14)
     assert rest.slope(0.0) == pytest.approx(0.01, rel=1e-14)
-    assert abs(rest.bending_moment(0.2)) < 1e-12 * np.max(
-        np.abs(rest.bending_moment(np.linspace(0, 0.2, 50)))
-    )
+    assert abs(rest.bending_moment(0.2)) < 1e-12 * np.max(np.abs(rest.bending_moment(np.linspace(0, 0.2, 50))))
     assert rest.shear_force(0.2) == pytest.approx(-0.1, rel=1e-10)
 
 
@@ -111,9 +106,7 @@ def test_section_forces_are_derivatives():
         (rest.bending_moment, rest.slope, NEEDLE.bending_stiffness),
         (rest.shear_force, rest.bending_moment, 1.0),
     ]:
-        central = (
-            8.0 * (lower(s + step) - lower(s - step)) - (lower(s + 2 * step) - lower(s - 2 * step))
-        ) / (12 * step)
+        central = (8.0 * (lower(s + step) - lower(s - step)) - (lower(s + 2 * step) - lower(s - 2 * step))) / (12 * step)
         scale = np.max(np.abs(upper(s)))
         assert factor * central == pytest.approx(upper(s), rel=1e-9, abs=1e-9 * scale)
 
@@ -151,9 +144,7 @@ def test_swelling_multiplies_every_layer_and_the_bevel_force():
     factor = Sinusoid(mean=1.5, amplitude=0.5, frequency=2.0)
     loads = [TipLoad(bevel_coefficient=1e-5)]
     swollen = exact_static(scene_of(loads=loads, factor=factor), 0.08, time=0.125)  # m = 2
-    layers = [
-        layer.model_copy(update={"foundation_modulus": 2.0 * layer.foundation_modulus}) for layer in LAYERS
-    ]
+    layers = [layer.model_copy(update={"foundation_modulus": 2.0 * layer.foundation_modulus}) for layer in LAYERS]
     plain = exact_static(scene_of(layers=layers, loads=loads), 0.08)
     assert swollen.tip_force == pytest.approx(1.0, rel=1e-14)
     assert swollen.tip_deflection == pytest.approx(plain.tip_deflection, rel=1e-13)
@@ -164,9 +155,7 @@ def test_swelling_multiplies_every_layer_and_the_bevel_force():
     [(0.0, 5e3), (0.0199, 5e3), (0.02, 2e4), (0.05, 0.0), (0.06, 5e4), (0.09, 0.0), (0.1, 0.0)],
 )
 def test_bevel_law_takes_the_deeper_layer(depth, modulus):
-    assert exact_static(scene_of(loads=[TipLoad(bevel_coefficient=1e-5)]), depth).tip_force == pytest.approx(
-        1e-5 * modulus
-    )
+    assert exact_static(scene_of(loads=[TipLoad(bevel_coefficient=1e-5)]), depth).tip_force == pytest.approx(1e-5 * modulus)
 
 
 def test_loads_at_their_time():
@@ -214,8 +203,6 @@ def test_hub_beyond_a_guide_is_refused():
 )
 def test_depth_of_the_sign_change(modulus, between, expected):
     """Beyond this depth a force at the skin moves the tip against it."""
-    scene = scene_of(
-        layers=[Layer(start=0.0, foundation_modulus=modulus)], loads=[LateralLoad(position=0.0, force=1.0)]
-    )
+    scene = scene_of(layers=[Layer(start=0.0, foundation_modulus=modulus)], loads=[LateralLoad(position=0.0, force=1.0)])
     found = brentq(lambda depth: exact_static(scene, depth).tip_deflection, *between, xtol=1e-12)
     assert found == pytest.approx(expected, abs=1e-4)

@@ -32,11 +32,7 @@ def release(depth=0.1, deflection=1e-3, **parts):
 def test_roots_to_machine_precision():
     with mp.workdps(80):
         expected = [
-            float(
-                mp.findroot(
-                    lambda x: mp.cos(x) + mp.sech(x), (i - mp.mpf("0.5")) * mp.pi + (0.3 if i == 1 else 0)
-                )
-            )
+            float(mp.findroot(lambda x: mp.cos(x) + mp.sech(x), (i - mp.mpf("0.5")) * mp.pi + (0.3 if i == 1 else 0)))
             for i in range(1, 31)
         ]
     assert clamped_free_roots(30) == pytest.approx(expected, rel=3e-16)
@@ -50,9 +46,7 @@ def test_static_limit_of_the_modes():
     """Sum of phi_i(L)^2 / (rho A omega_i^2) is the static compliance of the tip."""
     scene = held("entry", 0.1, loads=[TipLoad(force=1.0)])
     omega = natural_frequencies(scene, 0.1, 20000)
-    assert np.sum(40.0 / (0.01016 * omega**2)) == pytest.approx(
-        exact_static(scene, 0.1).tip_deflection, rel=1e-13
-    )
+    assert np.sum(40.0 / (0.01016 * omega**2)) == pytest.approx(exact_static(scene, 0.1).tip_deflection, rel=1e-13)
 
 
 def test_hub_in_one_tissue_or_none():
