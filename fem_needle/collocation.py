@@ -1,4 +1,4 @@
-"""Two-stage collocation methods with a chosen spectral radius at infinite frequency.
+"""Collocation methods: two stages with a chosen spectral radius at infinite frequency, and Gauss methods.
 
 The nodes are the zeros of P2(x) - alpha P1(x), shifted Legendre polynomials on 0..1, with alpha = (1 - rho)/(1 + rho). Then
 R(infinity) = rho: rho = 1 is Gauss (order 4, no numerical damping, keeps quadratic invariants), rho = 0 is Radau IIA (order 3,
@@ -23,9 +23,9 @@ class Collocation:
     Attributes
     ----------
     nodes, weights
-        c and b, shape (2,).
+        c and b, shape (stages,).
     inverse
-        A^-1, shape (2, 2): slopes at the nodes of the polynomial through 0 at the start and given values at the nodes.
+        A^-1, shape (stages, stages): slopes at the nodes of the polynomial through 0 at the start and given values at the nodes.
     end
         b A^-1: the polynomial's value at the end of the step from its values at the nodes.
     start_slope, end_slope
@@ -47,23 +47,29 @@ class Collocation:
 
 @lru_cache
 def collocation(spectral_radius: float) -> Collocation:
-    """Return the method with R(infinity) = ``spectral_radius``, 0 to 1."""
+    """Return the two-stage method with R(infinity) = ``spectral_radius``, 0 to 1."""
     alpha = (1 - spectral_radius) / (1 + spectral_radius)
     middle, half = (3 + alpha) / 6, np.sqrt((3 + alpha) ** 2 / 36 - (1 + alpha) / 6)
-    first, second = middle - half, min(middle + half, 1.0)
-    gap = second - first
-    # Lagrange polynomials of the derivative, integrated from 0
-    matrix = np.array(
-        [
-            [(second * x - x**2 / 2) / gap, (x**2 / 2 - first * x) / gap]
-            for x in (first, second)
-        ]
-    )
-    weights = np.array([(second - 0.5) / gap, (0.5 - first) / gap])
+    return _with_nodes(np.array([middle - half, min(middle + half, 1.0)]))
+
+
+@lru_cache
+def gauss(count: int) -> Collocation:
+    """Return the Gauss method with ``count`` nodes, of order 2 count."""
+    return _with_nodes((np.polynomial.legendre.leggauss(count)[0] + 1) / 2)
+
+
+def _with_nodes(nodes: Array) -> Collocation:
+    """Return the collocation method with given nodes, from the powers 1, x, x^2, ... of its derivative's polynomial."""
+    count = len(nodes)
+    exponents = np.arange(count)
+    lagrange = np.linalg.inv(np.vander(nodes, count, increasing=True))  # power coefficients of each Lagrange polynomial
+    matrix = (nodes[:, None] ** (exponents + 1) / (exponents + 1)) @ lagrange
+    weights = (1 / (exponents + 1)) @ lagrange
     inverse = np.linalg.inv(matrix)
-    at_start, at_end = np.array([second, -first]) / gap, np.array([second - 1, 1 - first]) / gap
+    at_start, at_end = lagrange[0], lagrange.sum(axis=0)
     return Collocation(
-        nodes=np.array([first, second]),
+        nodes=nodes,
         weights=weights,
         inverse=inverse,
         end=weights @ inverse,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 
 class NeedleError(Exception):
@@ -24,7 +25,15 @@ class SceneError(NeedleError, ValueError):
 
 
 class ComputationError(NeedleError, RuntimeError):
-    """A computation failed: says at which time and depth, and what to change."""
+    """A computation failed: says at which time and depth, and what to change.
+
+    Attributes
+    ----------
+    partial
+        The trajectory of what was computed before, or None.
+    """
+
+    partial: Any = None
 
 
 class SuspiciousValueWarning(UserWarning):

@@ -126,8 +126,8 @@ def step_works(
     method: Collocation,
     step: float,
     ends: tuple[StepEnd, StepEnd],
-    stages: tuple[Stage, Stage],
-    solutions: tuple[StageSolution, StageSolution],
+    stages: tuple[Stage, ...],
+    solutions: tuple[StageSolution, ...],
     *,
     inertia: bool = True,
 ) -> Works:

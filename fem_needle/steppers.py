@@ -6,12 +6,13 @@ All three return the same thing, a `Step`, so that the loop over time, the ledge
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf, nextafter
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.collocation import Collocation, collocation
+from fem_needle.collocation import Collocation, gauss
 from fem_needle.ledger import StepEnd
 from fem_needle.loads import load_case
 from fem_needle.motion import DepthLaw
@@ -45,7 +46,7 @@ class Step:
     ends
         State just after the start and just before the end.
     stages, solutions
-        The plant and its state at the two nodes.
+        The plant and its state at the nodes.
     system
         The factored matrix, for the next step where nothing moves.
     """
@@ -53,8 +54,8 @@ class Step:
     method: Collocation
     length: float
     ends: tuple[StepEnd, StepEnd]
-    stages: tuple[Stage, Stage]
-    solutions: tuple[StageSolution, StageSolution]
+    stages: tuple[Stage, ...]
+    solutions: tuple[StageSolution, ...]
     system: StepSystem | None = None
 
 
@@ -99,7 +100,7 @@ class DynamicStepper:
         """Solve the stages and extrapolate their polynomial to the end."""
         time = start.stage.instant.time
         length, middle = until - time, law.depth(0.5 * (time + until))
-        stages = self._stages(law, start.stage, time, length)
+        stages = self._stages(law, start.stage, time, until)
         system = _reusable(last, stages, length) or factor_step(self.plant, stages, self.method, length)
         begin = start.solution
         solutions = solve_step(self.plant, stages, self.method, length, system, begin.coordinates, begin.momentum)
@@ -108,7 +109,7 @@ class DynamicStepper:
             getattr(begin, name) + sum(w * (getattr(s, name) - getattr(begin, name)) for w, s in zip(weights, solutions, strict=True))
             for name in ("coordinates", "momentum")
         )
-        case = load_case(self.plant.scene, middle, np.nextafter(until, time))
+        case = load_case(self.plant.scene, middle, nextafter(until, time))
         stage = evaluate_stage(self.plant, law.before(until), case, stages[1])
         end_coordinates[: self.plant.prescribed] = case.clamp[: self.plant.prescribed]
         reactions = sum(w * s.forces for w, s in zip(self.method.end_value, solutions, strict=True))
@@ -117,11 +118,13 @@ class DynamicStepper:
         end = self._state(stage, end_coordinates, end_momentum, forces)
         return Step(self.method, length, (start, end), stages, solutions, system)
 
-    def _stages(self, law: DepthLaw, earlier: Stage, time: float, length: float) -> tuple[Stage, Stage]:
+    def _stages(self, law: DepthLaw, earlier: Stage, time: float, until: float) -> tuple[Stage, Stage]:
+        length, middle, latest = until - time, law.depth(0.5 * (time + until)), nextafter(until, time)
         found = []
         for node in self.method.nodes:
-            instant = law.before(time + node * length) if node == 1.0 else law.after(time + node * length)
-            case = load_case(self.plant.scene, instant.depth, instant.time)
+            instant = law.before(until) if node == 1.0 else law.after(time + node * length)
+            # A node at the end belongs to this step: loads and layers just before a kink.
+            case = load_case(self.plant.scene, middle if node == 1.0 else instant.depth, min(instant.time, latest))
             earlier = evaluate_stage(self.plant, instant, case, earlier)
             found.append(earlier)
         return found[0], found[1]
@@ -168,7 +171,7 @@ class StaticStepper:
 
     plant: Plant
     inertia: bool = False
-    method: Collocation = collocation(1.0)
+    method: Collocation = gauss(3)
 
     def start(self, law: DepthLaw, time: float, until: float, before: StepEnd) -> StepEnd:
         """Return the equilibrium just after a time."""
@@ -178,13 +181,14 @@ class StaticStepper:
         """Return the equilibria at the nodes and at the end."""
         time = start.stage.instant.time
         length, middle = until - time, law.depth(0.5 * (time + until))
-        first, second = (self._rest(law, time + node * length, middle, after=True) for node in self.method.nodes)
+        nodes = [self._rest(law, time + node * length, middle, after=True) for node in self.method.nodes]
         end = self._rest(law, until, middle, after=False)
-        return Step(self.method, length, (start, end), (first.stage, second.stage), (first.solution, second.solution))
+        stages, solutions = tuple(node.stage for node in nodes), tuple(node.solution for node in nodes)
+        return Step(self.method, length, (start, end), stages, solutions)
 
     def _rest(self, law: DepthLaw, time: float, layer_depth: float, *, after: bool) -> StepEnd:
         instant = law.after(time) if after else law.before(time)
-        case = load_case(self.plant.scene, layer_depth, time if after else np.nextafter(time, -np.inf))
+        case = load_case(self.plant.scene, layer_depth, time if after else nextafter(time, -inf))
         stage = evaluate_stage(self.plant, instant, case)
         if instant.depth < self.plant.smallest_depth:
             return StepEnd(stage, trivial_solution(self.plant, stage))

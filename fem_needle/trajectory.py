@@ -136,9 +136,11 @@ class Trajectory:
         return load_run(Path(folder))
 
 
-def trajectory_from_samples(plant: Plant, samples: Sequence[Sample], summary: dict[str, Any]) -> Trajectory:
-    """Collect samples, in order of time, into a trajectory."""
-    scene, length = plant.scene, plant.scene.needle.length
+def trajectory_from_samples(
+    plant: Plant, samples: Sequence[Sample], summary: dict[str, Any], scene: Scene | None = None
+) -> Trajectory:
+    """Collect samples, in order of time, into a trajectory; ``scene`` holds the run's settings where they differ from the plant's."""
+    scene, length = scene or plant.scene, plant.scene.needle.length
     stations = np.linspace(0.0, length, scene.numerics.output_points)
     shapes = np.stack([plant.deflection(s.coordinates, s.point_forces, s.depth, stations) for s in samples])
     series = {name: np.array([getattr(s, name) for s in samples]) for name in _FROM_SAMPLES}

@@ -1,0 +1,125 @@
+"""Automatic settings: which analysis, how many elements, which time step; and what they are estimated to cost in accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.errors import SceneError
+from fem_needle.free_response import natural_frequencies
+from fem_needle.motion import depth_law, run_duration
+from fem_needle.needle import FiniteElementNeedle
+from fem_needle.plant import Plant
+from fem_needle.scene import Scene
+from fem_needle.skipping import (
+    INERTIA_SHARE,
+    POINTS_PER_PERIOD,
+    Skipped,
+    inertia_effect,
+    shortest_period,
+    unneeded_terms,
+)
+from fem_needle.statics import solve_static
+
+Array = NDArray[np.float64]
+
+ELEMENT_CHOICES = (8, 12, 16, 24, 32, 48, 64, 96, 128)
+FEWEST_DYNAMIC_ELEMENTS = 16
+ELEMENT_SHARE = 0.1  # of the tolerance: what the mesh may cost
+PILOT_ELEMENTS = 8
+PILOT_INSTANTS = 7
+OUTPUTS = 200
+STEPS_PER_PERIOD = 16
+SHALLOW = 0.02  # of the length: shallower `entry` needles are too stiff to matter
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Settings of a run.
+
+    Attributes
+    ----------
+    analysis
+        "dynamic", "quasi-static" or "static".
+    output_step
+        Time between samples [s].
+    skipped
+        What is left out and why.
+    inertia_error
+        Bound on what leaving inertia out costs the tip, relative to its largest deflection.
+    """
+
+    analysis: str
+    output_step: float
+    skipped: tuple[Skipped, ...]
+    inertia_error: float
+
+
+def choose(scene: Scene, plant_with: Callable[[int], Plant]) -> Choice:
+    """Return analysis, output step and what is skipped; ``plant_with`` makes a plant with a number of elements."""
+    numerics = scene.numerics
+    duration = run_duration(scene)
+    step = numerics.output_step if isinstance(numerics.output_step, float) else duration / OUTPUTS
+    if step > duration:
+        raise SceneError(f"numerics.output_step: longer than the run (got {step:g}; allowed up to {duration:g} s)")
+    analysis, skipped, effect = numerics.analysis, tuple(unneeded_terms(scene)), 0.0
+    if analysis == "auto":
+        effect = inertia_effect(plant_with(PILOT_ELEMENTS))
+        allowed = INERTIA_SHARE * numerics.tolerance
+        analysis = "quasi-static" if effect <= allowed else "dynamic"
+        if analysis == "quasi-static":
+            reason = f"moves the tip by at most {effect:.1e} of its largest deflection (allowed {allowed:.1e})"
+            skipped = (Skipped("inertia", reason), *skipped)
+    elif analysis != "dynamic":
+        skipped = (Skipped("inertia", f"analysis = '{analysis}' was asked for"), *skipped)
+    return Choice(analysis, step, skipped, effect if analysis == "quasi-static" else 0.0)
+
+
+def choose_elements(scene: Scene, analysis: str) -> tuple[int, float]:
+    """Return the fewest elements whose static tips agree with twice as many, and the difference that remains.
+
+    Compared at instants spread over the run; relative to the largest tip deflection among them.
+    """
+    fewest = FEWEST_DYNAMIC_ELEMENTS if analysis == "dynamic" else ELEMENT_CHOICES[0]
+    allowed = ELEMENT_SHARE * scene.numerics.tolerance
+    candidates = [count for count in ELEMENT_CHOICES if count >= fewest]
+    error = np.inf
+    for count in candidates:
+        error = mesh_error(scene, FiniteElementNeedle(scene, elements=count), 2 * count)
+        if error <= allowed:
+            return count, error
+    return candidates[-1], error
+
+
+def mesh_error(scene: Scene, plant: Plant, finer: int) -> float:
+    """Return the largest difference of static tips from those on a finer mesh, relative to the largest tip."""
+    coarse = _static_tips(plant)
+    fine = _static_tips(FiniteElementNeedle(scene, elements=finer))
+    scale = max(float(np.max(np.abs(fine))), scene.numerics.absolute_tolerance)
+    return float(np.max(np.abs(coarse - fine))) / scale
+
+
+def first_time_step(plant: Plant, analysis: str, output_step: float) -> float:
+    """Return a step [s] to begin with: output, load periods and, with inertia, the longest natural period are resolved."""
+    step = min(output_step, shortest_period(plant.scene) / POINTS_PER_PERIOD)
+    if analysis != "dynamic":
+        return step
+    frequencies = [natural_frequencies(plant, depth, time)[0] for time, depth in _instants(plant)]
+    return min(step, 2 * pi / min(frequencies) / STEPS_PER_PERIOD)
+
+
+def _static_tips(plant: Plant) -> Array:
+    return np.array([solve_static(plant, depth=depth, time=time).tip_deflection for time, depth in _instants(plant)])
+
+
+def _instants(plant: Plant) -> list[tuple[float, float]]:
+    """Return (time, depth) spread over the run; what is hardly inserted yet is left out."""
+    scene, law = plant.scene, depth_law(plant.scene)
+    times = np.linspace(0.0, run_duration(scene), PILOT_INSTANTS).tolist()
+    found = [(time, law.depth(time)) for time in times]
+    shallow = SHALLOW * scene.needle.length if scene.support.kind == "entry" else 0.0
+    return [(time, max(depth, shallow)) for time, depth in found]

@@ -1,0 +1,55 @@
+"""How the tip rings after the needle is given a velocity: small dense eigenproblems at a frozen depth, for estimates."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, eigh, null_space
+
+from fem_needle import banded
+from fem_needle.plant import Plant
+
+Array = NDArray[np.float64]
+
+RESPONSE_POINTS = 400
+
+
+def frozen_matrices(plant: Plant, depth: float, time: float) -> tuple[Array, Array, Array, Array]:
+    """Return mass, damping, stiffness and the tip's row at a frozen depth, for coordinates that obey clamp and guides."""
+    operators, points, clamped = plant.operators(depth, time), plant.points(depth), plant.prescribed
+    rigid = [index for index in range(points.guides) if points.guide_compliance[index] == 0.0]
+    basis = null_space(points.rows[rigid, clamped:]) if rigid else np.eye(plant.size - clamped)
+
+    def reduced(band: Array | None) -> Array:
+        if band is None:
+            return np.zeros((basis.shape[1], basis.shape[1]))
+        return basis.T @ banded.to_dense(banded.trailing(band, clamped)) @ basis
+
+    stiffness = reduced(operators.stiffness)
+    for index in set(range(points.guides)) - set(rigid):
+        row = points.rows[index, clamped:] @ basis
+        stiffness = stiffness + np.outer(row, row) / points.guide_compliance[index]
+    return reduced(operators.mass), reduced(operators.damping), stiffness, basis.T
+
+
+def natural_frequencies(plant: Plant, depth: float, time: float = 0.0) -> Array:
+    """Return the undamped natural frequencies at a frozen depth [rad/s], rising."""
+    mass, _, stiffness, _ = frozen_matrices(plant, depth, time)
+    return np.sqrt(np.maximum(eigh(stiffness, mass, eigvals_only=True), 0.0))
+
+
+def ringing(plant: Plant, depth: float, time: float, velocity: Array) -> float:
+    """Return the largest |tip deflection| [m] after the needle at rest is given velocities q', over two periods."""
+    mass, damping, stiffness, basis = frozen_matrices(plant, depth, time)
+    momentum = basis @ banded.multiply(plant.operators(depth, time).mass, velocity)[plant.prescribed :]
+    factor, size = cho_factor(mass), len(mass)
+    system = np.zeros((2 * size, 2 * size))
+    system[:size, size:] = np.eye(size)
+    system[size:, :size], system[size:, size:] = -cho_solve(factor, stiffness), -cho_solve(factor, damping)
+    rates, shapes = np.linalg.eig(system)
+    amplitudes = np.linalg.solve(shapes, np.concatenate([np.zeros(size), cho_solve(factor, momentum)]).astype(complex))
+    lowest = float(np.sqrt(eigh(stiffness, mass, eigvals_only=True, subset_by_index=[0, 0])[0]))
+    times = np.geomspace(1e-4, 1.0, RESPONSE_POINTS) * (4 * np.pi / lowest)
+    tip = basis @ plant.points(depth).rows[-1, plant.prescribed :]
+    response = (tip @ shapes[:size] * amplitudes) @ np.exp(np.outer(rates, times))
+    return float(np.max(np.abs(response.real)))

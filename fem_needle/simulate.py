@@ -1,0 +1,283 @@
+"""Run a scene or a plant from start to end: the only place where a run begins."""
+
+from __future__ import annotations
+
+import time as clock
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from fem_needle.choices import Choice, choose, choose_elements, first_time_step, mesh_error
+from fem_needle.collocation import collocation
+from fem_needle.errors import ComputationError
+from fem_needle.march import TimeGrid, march, time_grid
+from fem_needle.needle import FiniteElementNeedle
+from fem_needle.plant import Plant
+from fem_needle.samples import Sample
+from fem_needle.scene import Scene
+from fem_needle.skipping import inertia_free_stepper
+from fem_needle.steppers import DynamicStepper, StaticStepper, Stepper
+from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
+
+MOST_HALVINGS = 8
+TIME_SHARE = 0.5  # of the tolerance: what the time step may cost
+RESIDUAL_SHARE = 0.01  # of the tolerance: the energy residual that automatic settings allow
+
+
+class Observer(Protocol):
+    """Somebody who watches a run: a progress bar, a writer of run folders."""
+
+    def begin(self, plant: Plant, choice: dict[str, Any]) -> None:
+        """Learn what is going to be computed."""
+
+    def progress(self, fraction: float) -> None:
+        """Learn how much of the run is done, 0 to 1; a refined run starts again."""
+
+    def sample(self, sample: Sample) -> None:
+        """Receive the next sample, once each; of a run that is being refined, when it is accurate enough."""
+
+
+@dataclass(frozen=True)
+class _Job:
+    """A plant, the scene with the settings of this run, what was chosen, and who watches."""
+
+    plant: Plant
+    scene: Scene
+    choice: Choice
+    mesh_error: float | None
+    observer: Observer
+    started: float
+
+
+class _Nobody:
+    """Watches nothing."""
+
+    def begin(self, plant: Plant, choice: dict[str, Any]) -> None:
+        """Ignore."""
+
+    def progress(self, fraction: float) -> None:
+        """Ignore."""
+
+    def sample(self, sample: Sample) -> None:
+        """Ignore."""
+
+
+def run_scene(
+    scene: Scene,
+    *,
+    model: str | None = None,
+    elements: int | None = None,
+    degree: int | None = None,
+    time_step: float | None = None,
+    tolerance: float | None = None,
+    analysis: str | None = None,
+    output_step: float | None = None,
+    observer: Observer | None = None,
+) -> Trajectory:
+    """Run a scene as ``fem-needle run`` does.
+
+    Parameters
+    ----------
+    scene
+        What to run. Every other argument overrides its ``[model]`` or ``[numerics]`` value.
+    model
+        "fem".
+    elements, degree
+        Mesh; default: chosen from the tolerance.
+    time_step
+        Largest step [s]; default: chosen from the tolerance.
+    tolerance
+        Largest tip error over the run / largest |tip deflection|.
+    analysis
+        "auto", "dynamic", "quasi-static" or "static".
+    output_step
+        Time between samples [s].
+    observer
+        Receives each sample.
+
+    Returns
+    -------
+    Trajectory
+        On an interrupt, of what was computed, with ``summary["stop_reason"] == "interrupted"``.
+
+    Raises
+    ------
+    SceneError
+        If a setting is impossible.
+    ComputationError
+        If a step fails; ``error.partial`` holds the trajectory so far, or None.
+    """
+    values = {
+        "model.kind": model,
+        "numerics.elements": elements,
+        "numerics.degree": degree,
+        "numerics.time_step": time_step,
+        "numerics.tolerance": tolerance,
+        "numerics.analysis": analysis,
+        "numerics.output_step": output_step,
+    }
+    scene = scene.with_values({path: value for path, value in values.items() if value is not None})
+    started = clock.perf_counter()
+    choice = choose(scene, lambda count: FiniteElementNeedle(scene, elements=count))
+    given = scene.numerics.elements
+    if given == "auto":
+        given, error = choose_elements(scene, choice.analysis)
+        plant = FiniteElementNeedle(scene, elements=given)
+    else:
+        plant = FiniteElementNeedle(scene, elements=given)
+        error = mesh_error(scene, plant, 2 * given)
+    return _run(_Job(plant, scene, choice, error, observer or _Nobody(), started))
+
+
+def simulate(
+    plant: Plant,
+    *,
+    time_step: float | Literal["auto"] | None = None,
+    analysis: str | None = None,
+    output_step: float | None = None,
+    tolerance: float | None = None,
+    observer: Observer | None = None,
+) -> Trajectory:
+    """Run a plant through its scene; arguments and errors as in `run_scene`."""
+    values = {
+        "numerics.time_step": time_step,
+        "numerics.analysis": analysis,
+        "numerics.output_step": output_step,
+        "numerics.tolerance": tolerance,
+    }
+    scene = plant.scene.with_values({path: value for path, value in values.items() if value is not None})
+    started = clock.perf_counter()
+    return _run(_Job(plant, scene, choose(scene, lambda count: plant), None, observer or _Nobody(), started))
+
+
+def _run(job: _Job) -> Trajectory:
+    """Run with the given step, or with steps that are halved until two runs agree."""
+    given, analysis = job.scene.numerics.time_step, job.choice.analysis
+    if isinstance(given, float):
+        return _run_live(job, given, None)
+    step = first_time_step(job.plant, analysis, job.choice.output_step)
+    if isinstance(_stepper(job), StaticStepper):
+        return _run_live(job, step, 0.0)
+    return _run_refined(job, step)
+
+
+def _run_live(job: _Job, time_step: float, time_error: float | None) -> Trajectory:
+    """Run once; the observer sees each sample as it comes."""
+    grid = time_grid(job.plant, time_step, job.choice.output_step)
+    _begin(job, grid)
+    samples: list[Sample] = []
+    stop = _collect(job, grid, samples, live=True)
+    return _trajectory(job, grid, samples, time_error, stop)
+
+
+def _run_refined(job: _Job, time_step: float) -> Trajectory:
+    """Halve the step until tips and energy ledger agree with the tolerance; then show the samples."""
+    grid = time_grid(job.plant, time_step, job.choice.output_step)
+    _begin(job, grid)
+    coarser: Trajectory | None = None
+    for _ in range(MOST_HALVINGS + 1):
+        samples: list[Sample] = []
+        stop = _collect(job, grid, samples, live=False)
+        run = _trajectory(job, grid, samples, None, stop)
+        if stop == "interrupted":
+            break
+        if coarser is not None:
+            error = _difference(coarser, run)
+            run.summary["error_estimate"] = _total(job, error)
+            if _is_accurate(job, error, run):
+                break
+        coarser, grid = run, replace(grid, time_step=_largest_step(grid) / 2)
+    else:
+        run.summary["warnings"].append(
+            f"the tolerance {job.scene.numerics.tolerance:g} was not reached with {grid.steps} steps; see error_estimate"
+        )
+    for sample in samples:
+        job.observer.sample(sample)
+    return run
+
+
+def _is_accurate(job: _Job, error: float, run: Trajectory) -> bool:
+    tolerance = job.scene.numerics.tolerance
+    residual = run.summary["relative_energy_residual"]
+    return error <= TIME_SHARE * tolerance and residual <= RESIDUAL_SHARE * tolerance
+
+
+def _difference(coarser: Trajectory, finer: Trajectory) -> float:
+    """Return the largest tip difference of two runs relative to the largest tip: a bound on the finer one's error."""
+    scale = max(float(np.max(np.abs(finer.tip_deflection))), finer.scene.numerics.absolute_tolerance)
+    return float(np.max(np.abs(coarser.tip_deflection - finer.tip_deflection))) / scale
+
+
+def _stepper(job: _Job) -> Stepper:
+    if job.choice.analysis == "dynamic":
+        return DynamicStepper(job.plant, collocation(job.scene.numerics.spectral_radius))
+    return StaticStepper(job.plant) if job.choice.analysis == "static" else inertia_free_stepper(job.plant)
+
+
+def _begin(job: _Job, grid: TimeGrid) -> None:
+    job.observer.begin(job.plant, _settings(job, grid) | {"output_times": grid.outputs})
+
+
+def _collect(job: _Job, grid: TimeGrid, samples: list[Sample], *, live: bool) -> str:
+    """Append the samples of a run and return why it stopped.
+
+    Raises
+    ------
+    ComputationError
+        With ``partial``, the trajectory so far.
+    """
+    try:
+        for sample in march(job.plant, _stepper(job), grid):
+            samples.append(sample)
+            job.observer.progress(sample.time / grid.outputs[-1])
+            if live:
+                job.observer.sample(sample)
+    except KeyboardInterrupt:
+        if not samples:
+            raise
+        return "interrupted"
+    except ComputationError as error:
+        if not live:
+            for sample in samples:
+                job.observer.sample(sample)
+        error.partial = _trajectory(job, grid, samples, None, "failed") if samples else None
+        raise
+    ends_by_itself = job.scene.run.duration is None and job.scene.insertion.final_depth is not None
+    return "final-depth" if ends_by_itself else "duration"
+
+
+def _trajectory(job: _Job, grid: TimeGrid, samples: list[Sample], time_error: float | None, stop: str) -> Trajectory:
+    now = clock.perf_counter()
+    run = trajectory_from_samples(job.plant, samples, {}, job.scene)
+    estimate = None if time_error is None else _total(job, time_error)
+    run.summary.update(
+        _settings(job, grid)
+        | summary_of(run)
+        | {
+            "error_estimate": estimate,
+            "warnings": [],
+            "stop_reason": stop,
+            "solve_time": now - job.started,
+            "wall_time": now - job.started,
+        }
+    )
+    return run
+
+
+def _settings(job: _Job, grid: TimeGrid) -> dict[str, Any]:
+    return job.plant.describe() | {
+        "analysis": job.choice.analysis,
+        "time_step": _largest_step(grid),
+        "steps": grid.steps,
+        "skipped": [asdict(skipped) for skipped in job.choice.skipped],
+    }
+
+
+def _largest_step(grid: TimeGrid) -> float:
+    return max((end - start) / count for start, end, count in grid.intervals())
+
+
+def _total(job: _Job, time_error: float) -> float | None:
+    """Return the sum of the estimated errors: time step, mesh, left-out inertia; None where the mesh was not checked."""
+    return None if job.mesh_error is None else time_error + job.mesh_error + job.choice.inertia_error
