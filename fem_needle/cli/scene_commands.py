@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from fem_needle.cli.tables import new_table, show
 from fem_needle.errors import SceneError
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of a shipped scene.")]
 
@@ -29,10 +27,10 @@ def scenes() -> None:
     """
     from fem_needle.shipped import shipped_scenes
 
-    table = _table("", "Name", "What it is")
+    table = new_table("", "Name", "What it is")
     for scene in shipped_scenes():
         table.add_row(scene.name, scene.title)
-    _show(table)
+    show(table)
 
 
 def new(
@@ -67,10 +65,10 @@ def check(
     from fem_needle.scene_file import load_scene
 
     loaded = load_scene(scene)
-    table = _table(loaded.title, "Key", "SI", "mm, N, s, degrees")
+    table = new_table(loaded.title, "Key", "SI", "mm, N, s, degrees")
     for row in scene_rows(loaded):
         table.add_row(*row)
-    _show(table)
+    show(table)
     typer.echo(f"note: {NOT_YOUNGS_MODULUS}")
     messages = suspicious(loaded)
     for message in messages:
@@ -87,24 +85,3 @@ def schema() -> None:
     from fem_needle.scene import Scene
 
     typer.echo(json.dumps(Scene.model_json_schema(), indent=2, ensure_ascii=False))
-
-
-def _table(title: str, *columns: str) -> Table:
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(title=Text(title) if title else None, box=box.SIMPLE_HEAD)
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    return table
-
-
-def _show(table: Table) -> None:
-    """Print a table; as wide as it is where the output is no terminal, so that no line breaks."""
-    from rich.console import Console
-
-    console = Console(markup=False, highlight=False)
-    if not console.is_terminal:
-        console = Console(markup=False, highlight=False, width=200)
-    console.print(table)

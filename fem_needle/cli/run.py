@@ -1,0 +1,153 @@
+"""The command `run`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from fem_needle.cli.scene_commands import SceneArgument
+from fem_needle.errors import ComputationError, NeedleError
+
+if TYPE_CHECKING:
+    from fem_needle.run_folder import RunFolderWriter
+    from fem_needle.run_target import RunTarget
+    from fem_needle.scene import Scene
+    from fem_needle.trajectory import Trajectory
+
+RUNS = Path("runs")
+
+Text = str | None
+
+
+def register(application: typer.Typer) -> None:
+    """Add the command."""
+    application.command("run")(run)
+
+
+def run(  # noqa: PLR0917 (one argument for each option of the command)
+    scene: SceneArgument,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Run folder; by default runs/<name>, then runs/<name>-2, ...")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the run in DIR.")] = False,
+    model: Annotated[Text, typer.Option(metavar="KIND", help="fem.")] = None,
+    elements: Annotated[Text, typer.Option(metavar="N", help="Elements over the part that bends, or auto.")] = None,
+    degree: Annotated[Text, typer.Option(metavar="N", help="Polynomial degree of an element, 3 or 4.")] = None,
+    time_step: Annotated[Text, typer.Option(metavar="TIME", help="Largest time step, such as 1e-3 or '1 ms', or auto.")] = None,
+    tolerance: Annotated[Text, typer.Option(metavar="X", help="Tip error / largest tip deflection to aim at.")] = None,
+    analysis: Annotated[Text, typer.Option(metavar="KIND", help="auto, dynamic, quasi-static or static.")] = None,
+    output_step: Annotated[Text, typer.Option(metavar="TIME", help="Time between samples, or auto.")] = None,
+    assignments: Annotated[
+        list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the scene; may be repeated.")
+    ] = None,
+    no_vtk: Annotated[bool, typer.Option("--no-vtk", help="Write no frames for ParaView.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print summary.json and nothing else.")] = False,
+    explain: Annotated[bool, typer.Option("--explain", help="Say what each row of the table means.")] = False,
+) -> None:
+    """Insert a needle and leave a run folder that ParaView opens.
+
+    Example: fem-needle run thesis --set tissue.layers.phantom.foundation_modulus=800
+    """
+    from fem_needle.cli.settings import changed
+    from fem_needle.run_target import RunTarget
+    from fem_needle.scene_file import load_scene
+
+    options = {
+        "model.kind": model,
+        "numerics.elements": elements,
+        "numerics.degree": degree,
+        "numerics.time_step": time_step,
+        "numerics.tolerance": tolerance,
+        "numerics.analysis": analysis,
+        "numerics.output_step": output_step,
+    }
+    loaded = changed(load_scene(scene), assignments or (), options)
+    target = RunTarget(RUNS / Path(scene).stem if out is None else out, force, numbered=out is None)
+    target.check()
+    _run(loaded, target, vtk=not no_vtk, quiet=as_json, explain=explain)
+
+
+def _run(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool, explain: bool) -> None:
+    from fem_needle.checks import suspicious
+    from fem_needle.cli.run_progress import Observers, ProgressBar
+    from fem_needle.run_folder import RunFolderWriter
+    from fem_needle.simulate import run_scene
+
+    messages = suspicious(scene)
+    for message in messages:
+        typer.echo(f"warning: {message}", err=True)
+    writer, bar = RunFolderWriter(target, vtk=vtk, warnings=messages), ProgressBar(scene.title)
+    try:
+        finished = run_scene(scene, observer=writer if quiet else Observers(bar, writer))
+        if finished.summary["stop_reason"] == "interrupted":
+            _stop(writer, finished, "interrupted", _interrupted(finished), quiet=quiet)
+        finished = writer.finish(finished)
+    except KeyboardInterrupt:
+        _stop(writer, None, "interrupted", "interrupted", quiet=quiet)
+    except ComputationError as error:
+        _stop(writer, error.partial, "failed", str(error), quiet=quiet)
+    finally:
+        bar.stop()
+    if quiet:
+        _print_json(finished.summary)
+    else:
+        _print_table(finished, writer, messages)
+    if explain:
+        _explain(to_stderr=quiet)
+
+
+def _interrupted(run: Trajectory) -> str:
+    return f"interrupted at time {run.time[-1]:g} s, depth {run.depth[-1]:g} m"
+
+
+def _stop(writer: RunFolderWriter, run: Trajectory | None, reason: str, message: str, *, quiet: bool) -> NoReturn:
+    """Save what was computed and end with a message that says where it is.
+
+    Raises
+    ------
+    typer.Exit
+        Always.
+    """
+    try:
+        summary = writer.break_off(run, reason)
+    except NeedleError as error:
+        message = f"{message}; {error}"
+        summary = {"stop_reason": reason, "folder": str(writer.folder)}
+    kept = "" if writer.folder is None else f"; what was computed is in {_short(writer.folder)}"
+    typer.echo(f"error: {message}{kept}", err=True)
+    if quiet and writer.folder is not None:
+        _print_json(summary)
+    raise typer.Exit(1)
+
+
+def _print_json(summary: dict[str, Any]) -> None:
+    from fem_needle.atomic_file import json_bytes
+
+    typer.echo(json_bytes(summary).decode(), nl=False)
+
+
+def _print_table(run: Trajectory, writer: RunFolderWriter, messages: Sequence[str]) -> None:
+    from fem_needle.cli.run_table import run_rows
+    from fem_needle.cli.tables import new_table, show
+
+    table = new_table(run.scene.title, "", "")
+    table.show_header = False
+    for row in run_rows(run, _short(writer.folder or RUNS), messages):
+        table.add_row(*row)
+    show(table)
+
+
+def _explain(*, to_stderr: bool) -> None:
+    from fem_needle.cli.run_table import EXPLANATION
+
+    for name, meaning in EXPLANATION:
+        typer.echo(f"{name}: {meaning}", err=to_stderr)
+
+
+def _short(folder: Path) -> Path:
+    """Return a path relative to the current folder where it lies inside."""
+    here = Path.cwd()
+    return folder.relative_to(here) if folder.is_relative_to(here) else folder

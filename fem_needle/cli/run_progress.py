@@ -1,0 +1,81 @@
+"""A progress bar on stderr, only where a run takes long enough to wonder."""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from fem_needle.plant import Plant
+    from fem_needle.samples import Sample
+
+PATIENCE = 1.0  # s
+
+
+class ProgressBar:
+    """An observer of a run that shows how much of it is done.
+
+    Parameters
+    ----------
+    title
+        What is run.
+    """
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._started = perf_counter()
+        self._bar: Progress | None = None
+        self._task: TaskID | None = None
+
+    def begin(self, plant: Plant, choice: dict[str, Any]) -> None:
+        """Ignore."""
+
+    def progress(self, fraction: float) -> None:
+        """Show a part that is done, 0 to 1."""
+        if self._bar is None and perf_counter() - self._started > PATIENCE:
+            self._show()
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, completed=fraction)
+
+    def sample(self, sample: Sample) -> None:
+        """Ignore."""
+
+    def stop(self) -> None:
+        """Leave the terminal as it was."""
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+    def _show(self) -> None:
+        from rich.console import Console
+        from rich.markup import escape
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+        columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+        self._bar = Progress(*columns, console=Console(stderr=True), transient=False)
+        self._task = self._bar.add_task(escape(self._title), total=1.0)
+        self._bar.start()
+
+
+class Observers:
+    """Several observers as one."""
+
+    def __init__(self, *observers: Any) -> None:
+        self._observers = observers
+
+    def begin(self, plant: Plant, choice: dict[str, Any]) -> None:
+        """Tell all."""
+        for observer in self._observers:
+            observer.begin(plant, choice)
+
+    def progress(self, fraction: float) -> None:
+        """Tell all."""
+        for observer in self._observers:
+            observer.progress(fraction)
+
+    def sample(self, sample: Sample) -> None:
+        """Tell all."""
+        for observer in self._observers:
+            observer.sample(sample)

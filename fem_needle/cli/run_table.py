@@ -1,0 +1,64 @@
+"""What `run` shows at the end: a short table in mm, N, s, and the explanation of its rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fem_needle.trajectory import Trajectory
+
+Row = tuple[str, str]
+
+EXPLANATION = (
+    ("depth", "inserted length z, from the tissue's surface to the tip, at the end of the run."),
+    ("tip deflection", "sideways displacement of the tip from the straight axis, in the sense of a positive lateral force."),
+    ("push force", "axial force that the insertion needs at the end, friction included; positive pushes in."),
+    ("energy residual", "largest gap in the balance of lateral energy and works, each term computed for itself."),
+    (
+        "error estimate",
+        "largest tip error over the run by the largest tip deflection: from finer time steps, finer elements and what was left "
+        "out. --tolerance sets the aim.",
+    ),
+    (
+        "analysis",
+        "dynamic: with inertia; quasi-static: without; static: a series of equilibria. --analysis chooses, else the tolerance.",
+    ),
+    ("elements, time step", "--elements, --degree and --time-step choose, else the tolerance."),
+    ("left out", "terms of the equation of motion that do not matter here, each with its reason."),
+    ("run folder", "scene.toml repeats the run; summary.json has this table in SI; series.nc everything over time."),
+)
+
+
+def run_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str]) -> Iterator[Row]:
+    """Yield name and value of every row; warnings that were shown before are left out."""
+    summary = run.summary
+    yield "depth", f"{1e3 * summary['final_depth']:.4g} mm at {run.time[-1]:.4g} s ({summary['stop_reason']})"
+    tip, largest = 1e3 * summary["final_tip_deflection"], 1e3 * summary["max_abs_tip_deflection"]
+    yield "tip deflection", f"{tip:.4g} mm (largest {largest:.4g} mm)"
+    yield "push force", f"{run.push_force[-1]:.4g} N"
+    yield "energy residual", f"{summary['relative_energy_residual']:.1e} of the largest lateral energy"
+    yield "error estimate", _estimate(summary.get("error_estimate"), run.scene.numerics.tolerance)
+    yield "analysis", str(summary["analysis"])
+    yield "elements, time step", _discretization(summary)
+    for index, skipped in enumerate(summary.get("skipped", ())):
+        yield "" if index else "left out", f"{skipped['term']}: {skipped['reason']}"
+    for warning in summary.get("warnings", ()):
+        if warning not in known_warnings:
+            yield "warning", warning
+    yield "computed in", f"{summary['solve_time']:.2g} s"
+    yield "run folder", str(folder)
+    if (folder / "deflection.pvd").exists():
+        yield "ParaView", f"open {folder / 'deflection.pvd'}, Apply, then Filters > Warp By Vector with 'deflection'"
+
+
+def _estimate(estimate: float | None, tolerance: float) -> str:
+    if estimate is None:
+        return "none: no finer computation to compare with"
+    return f"{estimate:.1e} of the largest tip deflection (tolerance {tolerance:.1e})"
+
+
+def _discretization(summary: dict[str, Any]) -> str:
+    degree = f" of degree {summary['degree']}" if "degree" in summary else ""
+    return f"{summary.get('elements', '?')}{degree}; {summary['steps']} steps of up to {summary['time_step']:.4g} s"

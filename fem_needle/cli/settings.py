@@ -1,0 +1,50 @@
+"""Settings of the command line that change a scene: `--set path=value` and the options beside it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from fem_needle.errors import SceneError
+
+if TYPE_CHECKING:
+    from fem_needle.scene import Scene
+
+
+def changed(scene: Scene, assignments: Sequence[str], options: Mapping[str, str | None]) -> Scene:
+    """Return a scene with the settings of the command line.
+
+    Parameters
+    ----------
+    scene
+        As loaded.
+    assignments
+        ``path=value`` each; a value as in a scene file, without quotes where it is a text.
+    options
+        Path and text of options; None where not given. They win over assignments.
+
+    Raises
+    ------
+    SceneError
+        If an assignment has no path or value, or the changed scene is impossible.
+    """
+    values = dict(_assignment(text) for text in assignments)
+    values |= {path: value_of(text) for path, text in options.items() if text is not None}
+    return scene.with_values(values) if values else scene
+
+
+def value_of(text: str) -> Any:
+    """Return a number, list or table where the text is one in TOML, else the text itself."""
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text.strip()
+    return parsed["value"] if len(parsed) == 1 else text
+
+
+def _assignment(text: str) -> tuple[str, Any]:
+    path, equals, value = text.partition("=")
+    if not (path.strip() and equals and value.strip()):
+        raise SceneError(f"--set: got {text!r}; allowed path=value, for example --set needle.length=150mm")
+    return path.strip(), value_of(value)

@@ -1,0 +1,106 @@
+"""Where a run folder goes, without ever overwriting anything by accident."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+
+from fem_needle.errors import SceneError
+from fem_needle.manifest import is_run_folder
+
+# What a run folder holds; `force` removes this and nothing else.
+FILES = ("summary.json", "series.nc", "deflection.pvd", "scene.toml", "manifest.json")
+FRAMES = (("needle", "*.vtp"), ("tissue", "*.vtu"))
+
+
+@dataclass(frozen=True)
+class RunTarget:
+    """A place for a run folder.
+
+    Attributes
+    ----------
+    path
+        The folder.
+    force
+        Replace the run that is there.
+    numbered
+        Take ``path-2``, ``path-3``, ... where ``path`` exists.
+    """
+
+    path: Path
+    force: bool = False
+    numbered: bool = False
+
+    def check(self) -> None:
+        """Refuse, before anything is computed, what `create` would refuse.
+
+        Raises
+        ------
+        SceneError
+            If something is there that must not be overwritten.
+        """
+        try:
+            there = self.path.exists() or self.path.is_symlink()
+            if not there or (self.numbered and not self.force) or self._is_empty_folder():
+                return
+        except (OSError, ValueError) as error:
+            raise SceneError(f"{self.path}: cannot be used as a run folder: {error}") from None
+        if not is_run_folder(self.path):
+            raise SceneError(f"{self.path}: exists and is no run folder; it is left as it is (name another folder)")
+        if not self.force:
+            raise SceneError(f"{self.path}: exists already; --force (force=True) replaces the run in it")
+        if any((self.path / name).is_symlink() for name, _ in FRAMES):
+            raise SceneError(f"{self.path}: holds links in place of folders; it is left as it is")
+
+    def create(self) -> Path:
+        """Create the folder and return it, absolute.
+
+        Raises
+        ------
+        SceneError
+            As `check`, or if the folder cannot be created.
+        """
+        self.check()
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            return self._made().resolve()
+        except (OSError, ValueError) as error:
+            raise SceneError(f"{self.path}: cannot be created: {error}") from None
+
+    def _made(self) -> Path:
+        if self.numbered and not self.force:
+            return _first_free(self.path)
+        if self.path.exists():
+            _clear(self.path)
+        else:
+            self.path.mkdir()
+        return self.path
+
+    def _is_empty_folder(self) -> bool:
+        return self.path.is_dir() and not any(self.path.iterdir())
+
+
+def _first_free(path: Path) -> Path:
+    """Create the first folder of its numbers that is free; two runs at once get two folders."""
+    for number in count(1):
+        candidate = path if number == 1 else path.with_name(f"{path.name}-{number}")
+        try:
+            candidate.mkdir()
+        except FileExistsError:
+            continue
+        return candidate
+    raise AssertionError("unreachable")
+
+
+def _clear(folder: Path) -> None:
+    """Remove the files of a run; the manifest last, so that what is left of a clearing broken off is still a run folder."""
+    for name, pattern in FRAMES:
+        frames = folder / name
+        if frames.is_dir():
+            for path in frames.glob(pattern):
+                path.unlink()
+            if not any(frames.iterdir()):
+                frames.rmdir()
+    for name in FILES:
+        (folder / name).unlink(missing_ok=True)

@@ -1,0 +1,69 @@
+"""`series.nc`: netCDF-4 that netCDF4, h5py, xarray and MATLAB open. SI; every variable with `units` and `long_name`."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.trajectory import VARIABLES, Trajectory
+
+Array = NDArray[np.float64]
+
+# Besides those of `VARIABLES`, which are over time: dimensions, unit, meaning.
+COORDINATES = {
+    "time": (("time",), "s", "time since the start of the run"),
+    "arc_length": (("arc_length",), "m", "station along the needle from the hub, 0, to the tip"),
+    "guide": (("guide",), "m", "position y of the guide; negative before the surface"),
+}
+FIELDS = {
+    "deflection": (("time", "arc_length"), "m", "lateral displacement of the needle"),
+    "guide_force": (("time", "guide"), "N", "lateral force of the guide on the needle"),
+}
+
+
+def series_bytes(run: Trajectory) -> bytes:
+    """Return the file of a run.
+
+    Built in memory: a full disk then meets one plain write instead of a half-written HDF5 file.
+    """
+    guides = np.array([guide.position for guide in run.scene.support.guides], dtype=float)
+    values = {
+        "time": run.time,
+        "arc_length": run.arc_length,
+        "guide": guides,
+        **run.series,
+        "deflection": run.station_deflection,
+        "guide_force": run.guide_force,
+    }
+    described = COORDINATES | {name: (("time",), *about) for name, about in VARIABLES.items()} | FIELDS
+    memory = BytesIO()
+    with h5netcdf.File(memory, "w") as file:
+        file.attrs.update({"title": run.scene.title, "Conventions": "CF-1.8", "format": 1})
+        file.dimensions = {"time": run.time.size, "arc_length": run.arc_length.size, "guide": guides.size}
+        for name, (dimensions, unit, meaning) in described.items():
+            _add(file, name, dimensions, values[name], {"units": unit, "long_name": meaning})
+    return memory.getvalue()
+
+
+def _add(file: Any, name: str, dimensions: tuple[str, ...], values: Array, attributes: dict[str, str]) -> None:
+    data = np.asarray(values, dtype=float)
+    packing: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if data.size else {}
+    variable = file.create_variable(name, dimensions, "f8", data=data, fillvalue=None, **packing)
+    variable.attrs.update(attributes)
+
+
+def read_series(path: Path) -> dict[str, Array]:
+    """Return every variable of a file by name.
+
+    Raises
+    ------
+    OSError
+        If there is no such file, or it is not netCDF-4.
+    """
+    with h5netcdf.File(path, "r") as file:
+        return {name: np.asarray(variable[...], dtype=float) for name, variable in file.variables.items()}
