@@ -30,9 +30,6 @@ class Collocation:
         b A^-1: the polynomial's value at the end of the step from its values at the nodes.
     start_slope, end_slope
         Its derivative at the start and at the end, likewise.
-    start_value, end_value
-        The line through the values at the nodes, at the start and at the end (for multipliers, which have no value at the
-        start of a step).
     """
 
     nodes: Array
@@ -41,8 +38,6 @@ class Collocation:
     end: Array
     start_slope: Array
     end_slope: Array
-    start_value: Array
-    end_value: Array
 
 
 @lru_cache
@@ -75,6 +70,4 @@ def _with_nodes(nodes: Array) -> Collocation:
         end=weights @ inverse,
         start_slope=at_start @ inverse,
         end_slope=at_end @ inverse,
-        start_value=at_start,
-        end_value=at_end,
     )

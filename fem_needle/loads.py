@@ -40,6 +40,14 @@ def second_derivative(function: TimeFunction, time: float) -> float:
     return -((2 * pi * function.frequency) ** 2) * (function.value(time) - function.mean)
 
 
+def is_steady(scene: Scene) -> bool:
+    """Return whether forces and hub stay the same at a fixed depth."""
+    support = scene.support
+    values = [support.hub_deflection, support.hub_angle, scene.tissue.stiffness_factor]
+    values += [load.force for load in scene.loads if load.force is not None]
+    return all(isinstance(value, float) for value in values)
+
+
 def load_case(scene: Scene, depth: float, time: float) -> LoadCase:
     """Return the loads at a depth [m] (the bevel law asks for the layer at the tip) and time [s]."""
     lateral = [as_function(load.force) for load in scene.loads if isinstance(load, LateralLoad)]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fem_needle import banded
 from fem_needle.elements.integrals import interval_integrals
-from fem_needle.elements.kink import kink, kink_shift_rate
+from fem_needle.elements.kink import kink, kink_compliance, kink_shift_rate
 from fem_needle.elements.mesh import LineMesh, uniform_mesh
 from fem_needle.errors import SceneError
 from fem_needle.foundation import Foundation
@@ -88,6 +88,7 @@ class FiniteElementNeedle:
             drag=drag,
             slip=slip,
             tissue_rate=tissue * factor_rate if factor_rate else None,
+            clamped=self.prescribed,
         )
 
     def straight(self, deflection: float, angle: float) -> Array:
@@ -131,7 +132,7 @@ class FiniteElementNeedle:
             for second, (other, other_place) in enumerate(places):
                 if element == other:
                     scale, degree = self._kink_scale(element), self.mesh.degree
-                    flexibility[first, second] = scale * kink(place, other_place, degree)
+                    flexibility[first, second] = scale * kink_compliance(place, other_place, degree)
                     moved = -kink_shift_rate(place, other_place, degree) / self.mesh.lengths[element]
                     flexibility_rate[first, second] = scale * moved
         guides = self.scene.support.guides

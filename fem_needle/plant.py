@@ -13,11 +13,13 @@ kink that the model's shapes miss inside an element. M, S, R, K, G, C, D, E, N, 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle import banded
 from fem_needle.scene import Scene
 
 Array = NDArray[np.float64]
@@ -37,6 +39,8 @@ class Operators:
         C, D, E.
     tissue_rate
         dm/dt G, of a tissue that swells.
+    clamped
+        How many leading coordinates are the clamp's.
     """
 
     mass: Array
@@ -48,11 +52,17 @@ class Operators:
     drag: Array | None = None
     slip: Array | None = None
     tissue_rate: Array | None = None
+    clamped: int = 0
 
-    @property
+    @cached_property
     def stiffness(self) -> Array:
         """Bending and tissue together."""
         return self.bending + self.tissue
+
+    @cached_property
+    def mass_factorization(self) -> banded.Factorization:
+        """Factors of the mass matrix of the coordinates that are not clamped."""
+        return banded.Factorization(banded.trailing(self.mass, self.clamped))
 
 
 @dataclass(frozen=True, eq=False)

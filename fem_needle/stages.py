@@ -70,7 +70,7 @@ def velocities_of(plant: Plant, stage: Stage, coordinates: Array, start_momentum
     velocities = np.zeros_like(coordinates)
     velocities[:clamped] = stage.case.clamp_rates[:clamped]
     right = (start_momentum - momentum(stage, coordinates, velocities))[clamped:]
-    velocities[clamped:] = banded.Factorization(banded.trailing(stage.operators.mass, clamped)).solve(right)
+    velocities[clamped:] = stage.operators.mass_factorization.solve(right)
     return velocities
 
 

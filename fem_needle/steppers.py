@@ -5,7 +5,7 @@ All three return the same thing, a `Step`, so that the loop over time, the ledge
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf, nextafter
 from typing import Protocol
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fem_needle.collocation import Collocation, gauss
 from fem_needle.ledger import StepEnd
-from fem_needle.loads import load_case
+from fem_needle.loads import LoadCase, is_steady, load_case
 from fem_needle.motion import DepthLaw
 from fem_needle.plant import Operators, Plant
 from fem_needle.stages import (
@@ -88,11 +88,15 @@ class DynamicStepper:
     plant: Plant
     method: Collocation
     inertia: bool = True
+    _steady: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_steady", is_steady(self.plant.scene))
 
     def start(self, law: DepthLaw, time: float, until: float, before: StepEnd) -> StepEnd:
         """Carry coordinates and momentum over a possible jump of speed or of the hub's velocity."""
         middle = law.depth(0.5 * (time + until))
-        stage = evaluate_stage(self.plant, law.after(time), load_case(self.plant.scene, middle, time), before.stage)
+        stage = evaluate_stage(self.plant, law.after(time), self._loads(middle, time, before.stage), before.stage)
         solution = before.solution
         return self._state(stage, solution.coordinates, solution.momentum, solution.forces)
 
@@ -109,14 +113,34 @@ class DynamicStepper:
             getattr(begin, name) + sum(w * (getattr(s, name) - getattr(begin, name)) for w, s in zip(weights, solutions, strict=True))
             for name in ("coordinates", "momentum")
         )
-        case = load_case(self.plant.scene, middle, nextafter(until, time))
+        case = self._loads(middle, nextafter(until, time), stages[1])
         stage = evaluate_stage(self.plant, law.before(until), case, stages[1])
         end_coordinates[: self.plant.prescribed] = case.clamp[: self.plant.prescribed]
-        reactions = sum(w * s.forces for w, s in zip(self.method.end_value, solutions, strict=True))
-        guides = stage.points.guides
-        forces = np.concatenate([reactions[:guides], case.forces])
+        forces = np.concatenate([self._end_reactions(stage, end_coordinates, solutions), case.forces])
         end = self._state(stage, end_coordinates, end_momentum, forces)
         return Step(self.method, length, (start, end), stages, solutions, system)
+
+    def _loads(self, depth: float, time: float, earlier: Stage) -> LoadCase:
+        """Return the loads; the earlier ones where nothing can have changed."""
+        if self._steady and depth == earlier.instant.depth:
+            return earlier.case
+        return load_case(self.plant.scene, depth, time)
+
+    def _end_reactions(self, stage: Stage, coordinates: Array, solutions: tuple[StageSolution, ...]) -> Array:
+        """Return the guides' forces at the end of a step: springs from their deflection there.
+
+        A rigid guide's is the mean over the step: the values at the nodes alternate about it (an index-3 multiplier).
+        """
+        points = stage.points
+        guides = points.guides
+        mean = sum(w * s.forces[:guides] for w, s in zip(self.method.weights, solutions, strict=True))
+        forces = np.concatenate([np.asarray(mean), stage.case.forces])
+        for index in range(guides):
+            compliance = points.guide_compliance[index] + points.flexibility[index, index]
+            if points.guide_compliance[index] > 0.0:
+                others = float(points.flexibility[index] @ forces) - points.flexibility[index, index] * forces[index]
+                forces[index] = -(float(points.rows[index] @ coordinates) + others) / compliance
+        return forces[:guides]
 
     def _stages(self, law: DepthLaw, earlier: Stage, time: float, until: float) -> tuple[Stage, Stage]:
         length, middle, latest = until - time, law.depth(0.5 * (time + until)), nextafter(until, time)
@@ -124,7 +148,7 @@ class DynamicStepper:
         for node in self.method.nodes:
             instant = law.before(until) if node == 1.0 else law.after(time + node * length)
             # A node at the end belongs to this step: loads and layers just before a kink.
-            case = load_case(self.plant.scene, middle if node == 1.0 else instant.depth, min(instant.time, latest))
+            case = self._loads(middle if node == 1.0 else instant.depth, min(instant.time, latest), earlier)
             earlier = evaluate_stage(self.plant, instant, case, earlier)
             found.append(earlier)
         return found[0], found[1]

@@ -74,7 +74,7 @@ def _run(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool, explain: bo
     from fem_needle.checks import suspicious
     from fem_needle.cli.run_progress import Observers, ProgressBar
     from fem_needle.run_folder import RunFolderWriter
-    from fem_needle.simulate import run_scene
+    from fem_needle.simulation import run_scene
 
     messages = suspicious(scene)
     for message in messages:

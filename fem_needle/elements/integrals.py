@@ -77,20 +77,23 @@ class IntervalIntegrals:
         length, node = self.mesh.lengths[element], self.mesh.nodes[element]
         points, weights = _gauss()
         position = start + (end - start) * points
-        shapes = self._factors(np.clip((position - node) / length, 0.0, 1.0), length, position)
+        place = np.minimum(np.maximum((position - node) / length, 0.0), 1.0)
+        shapes = self._factors(element, place, position)
         local = (shapes[0] * (weights * (end - start) * factor)) @ shapes[1].T
         banded.add_local(target, self.mesh.reference.stride * element, local)
 
-    def _factors(self, place: Array, length: float, position: Array) -> tuple[Array, Array]:
-        shapes = self.mesh.reference.shapes
+    def _factors(self, element: int, place: Array, position: Array) -> tuple[Array, Array]:
+        shapes = self.mesh.shapes_in
         if self.kind == "mass":
-            values = shapes(place, length)
+            values = shapes(element, place)
             return values, values
         if self.kind == "bending":
-            curvatures = shapes(place, length, 2)
+            curvatures = shapes(element, place, 2)
             return curvatures, curvatures
-        slopes = shapes(place, length, 1) * position**self.power
-        return (shapes(place, length) if self.kind == "drag" else slopes), slopes
+        slopes = shapes(element, place, 1)
+        if self.power:
+            slopes = slopes * position**self.power
+        return (shapes(element, place) if self.kind == "drag" else slopes), slopes
 
 
 def interval_integrals(mesh: LineMesh, kind: Kind, power: int = 0) -> IntervalIntegrals:
@@ -101,7 +104,7 @@ def interval_integrals(mesh: LineMesh, kind: Kind, power: int = 0) -> IntervalIn
 
 def _element_matrices(mesh: LineMesh, kind: Kind, power: int) -> Array:
     reference, lengths = mesh.reference, mesh.lengths[:, None, None]
-    scale = reference.slope_scale(mesh.lengths).T
+    scale = mesh.scales
     scales = scale[:, :, None] * scale[:, None, :]
     if kind == "mass":
         return reference.mass * scales * lengths

@@ -22,16 +22,20 @@ class LineMesh:
         Rising positions, shape (elements + 1,): arc length [m] under hub support, depth fraction 0..1 under entry support.
     degree
         Polynomial degree of an element, 3 or 4.
+    reference, lengths, scales
+        Derived: the reference element, the elements' lengths and their factors from unit shapes to shapes.
     """
 
     nodes: Array
     degree: int = 4
     reference: ReferenceElement = field(init=False)
     lengths: Array = field(init=False)
+    scales: Array = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "reference", reference_element(self.degree))
         object.__setattr__(self, "lengths", np.diff(self.nodes))
+        object.__setattr__(self, "scales", self.reference.slope_scale(self.lengths).T.copy())
 
     @property
     def elements(self) -> int:
@@ -60,10 +64,13 @@ class LineMesh:
         element, place = self.locate(position)
         row = np.zeros(self.size)
         first = self.reference.stride * element
-        row[first : first + self.reference.count] = self.reference.shapes(
-            place, self.lengths[element], derivative
-        )
+        row[first : first + self.reference.count] = self.shapes_in(element, place, derivative)
         return row
+
+    def shapes_in(self, element: int, place: Array | float, derivative: int = 0) -> Array:
+        """Return the shapes (count, ...) of one element, or a derivative by position, at places 0..1."""
+        values = self.reference.unit_shapes(place, derivative)
+        return (values.T * (self.scales[element] / self.lengths[element] ** derivative)).T
 
     def evaluate(self, coordinates: Array, positions: Array, derivative: int = 0) -> Array:
         """Return values (..., positions) of functions with coordinates (..., size), or of a derivative."""
@@ -71,7 +78,7 @@ class LineMesh:
         where = np.clip(where, 0, self.elements - 1)
         size = self.lengths[where]
         place = np.clip((positions - self.nodes[where]) / size, 0.0, 1.0)
-        shapes = self.reference.shapes(place, size, derivative)
+        shapes = self.reference.unit_shapes(place, derivative) * self.scales[where].T / size**derivative
         columns = self.reference.stride * where + np.arange(self.reference.count)[:, None]
         return np.einsum("...ij,ij->...j", coordinates[..., columns], shapes)
 

@@ -48,9 +48,6 @@ class HermiteWithBubble(skfem.ElementLineHermite):
         return F[()](0.5 * (left + right)) - middle
 
 
-_POWERS = np.arange(5.0)
-
-
 @dataclass(frozen=True)
 class ReferenceElement:
     """Matrices on the unit element, assembled once with scikit-fem.
@@ -81,15 +78,14 @@ class ReferenceElement:
         """Coordinates of one element."""
         return self.degree + 1
 
-    def shapes(self, x: Array | float, length: Array | float, derivative: int = 0) -> Array:
-        """Return the shapes (count, ...) or a derivative of them by position, at x in 0..1 of an element of a length [m]."""
+    def unit_shapes(self, place: Array | float, derivative: int = 0) -> Array:
+        """Return the shapes (count, ...) of an element of unit length, or a derivative, at places 0..1."""
         coefficients = _derivative_coefficients(self.degree, derivative)
-        place = np.asarray(x, dtype=float)
-        powers = place[..., None] ** _POWERS[: coefficients.shape[1]]
-        values = coefficients @ powers.T if place.ndim else coefficients @ powers
-        size = np.broadcast_to(np.asarray(length, dtype=float), place.shape)
-        scaled = values * self.slope_scale(size)
-        return scaled / size**derivative if derivative else scaled
+        x = np.asarray(place, dtype=float)
+        powers = np.ones((coefficients.shape[1], *x.shape))
+        for exponent in range(1, len(powers)):
+            powers[exponent] = powers[exponent - 1] * x
+        return coefficients @ powers
 
     def slope_scale(self, length: Array | float) -> Array:
         """Return the factor (count, ...) that turns unit-element slopes into slopes by position."""

@@ -20,7 +20,7 @@ from fem_needle.atomic_file import json_bytes
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.run_folder import RunFolderWriter, load_run, save_run
 from fem_needle.run_target import RunTarget
-from fem_needle.simulate import simulate
+from fem_needle.simulation import simulate
 from fem_needle.trajectory import VARIABLES, Trajectory
 from tests.unit.scene.examples import entry_data, hub_scene
 

@@ -190,10 +190,18 @@ def _run_refined(job: _Job, time_step: float) -> Trajectory:
         coarser, grid = run, replace(grid, time_step=_largest_step(grid) / 2)
     else:
         run.summary["warnings"].append(
-            f"the tolerance {job.scene.numerics.tolerance:g} was not reached with {grid.steps} steps; see error_estimate"
+            f"the tolerance {job.scene.numerics.tolerance:g} was not reached with {run.summary['steps']} steps; see error_estimate"
         )
-    for sample in samples:
-        job.observer.sample(sample)
+    return _shown(job, run, samples)
+
+
+def _shown(job: _Job, run: Trajectory, samples: list[Sample]) -> Trajectory:
+    """Show finished samples to the observer; an interrupt while it writes leaves the run whole."""
+    try:
+        for sample in samples:
+            job.observer.sample(sample)
+    except KeyboardInterrupt:
+        run.summary["stop_reason"] = "interrupted"
     return run
 
 
