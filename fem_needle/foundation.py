@@ -1,7 +1,7 @@
 """Matrices of the tissue: the layers integrated exactly over the parts of the elements that they hold.
 
-G(z) = sum_i k_i F_i(z), with the unit matrices F_i = integral of psi psi over layer i: the only place where a foundation modulus is
-multiplied, so that dG/dk_i = F_i.
+G(z) = sum_i k_i F_i(z), with the unit matrices F_i = integral of psi psi over layer i: the only place where a foundation
+modulus is multiplied, so that dG/dk_i = F_i.
 """
 
 from __future__ import annotations

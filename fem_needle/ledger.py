@@ -1,8 +1,8 @@
 """The energy ledger: energies of a state, works of a step, and the axial force A.
 
-Lateral: change of kinetic + bending + tissue energy = load_work + hub_work + tissue_work - tissue_dissipation + boundary_energy, with
-boundary_energy = -integral A v dt and A = dL/dz - d(dT/dv)/dt + drag, taken from the discrete Lagrangian. Every term is evaluated
-on its own; nothing is a remainder. Derivation: docs/theory.md, section "Energy".
+Lateral: change of kinetic + bending + tissue energy = load_work + hub_work + tissue_work - tissue_dissipation + boundary_energy,
+with boundary_energy = -integral A v dt and A = dL/dz - d(dT/dv)/dt + drag, taken from the discrete Lagrangian. Every term is
+evaluated on its own; nothing is a remainder. Derivation: docs/theory.md, section "Energy".
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def form(band: Array | None, left: Array, right: Array) -> float:
 
 def energies(stage: Stage, coordinates: Array, velocities: Array, forces: Array) -> Energies:
     """Return the energies of a state; pass zero velocities and speed for a static one."""
-    operators, points, speed = stage.operators, stage.points, stage.instant.speed
+    operators, speed = stage.operators, stage.instant.speed
     kinetic = 0.5 * form(operators.mass, velocities, velocities)
     if speed:
         kinetic += speed * form(operators.convection, velocities, coordinates)
@@ -76,7 +76,7 @@ def energies(stage: Stage, coordinates: Array, velocities: Array, forces: Array)
 def potential_energies(stage: Stage, coordinates: Array, forces: Array) -> tuple[float, float, float]:
     """Return bending energy, tissue energy (guides' springs included) and the guides' part [J]."""
     operators, points = stage.operators, stage.points
-    bending = form(operators.bending, coordinates, coordinates) + forces @ points.flexibility @ forces
+    bending = form(operators.bending, coordinates, coordinates) + float(forces @ points.flexibility @ forces)
     reactions = forces[: points.guides]
     guide = 0.5 * float(reactions @ (points.guide_compliance * reactions))
     return 0.5 * bending, 0.5 * form(operators.tissue, coordinates, coordinates) + guide, guide

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fem_needle.loads import second_derivative
-from fem_needle.scene import LateralLoad, Scene, Sinusoid, Table, TipLoad, as_function
+from fem_needle.scene import LateralLoad, Scene, Sinusoid, Table, TimeFunction, TipLoad, as_function
 from fem_needle.segments import interfaces
 
 MONOTONE_PIECES = 64  # per period of a sinusoid, in the search for crossings of a depth
@@ -46,7 +46,7 @@ class DepthLaw:
         """Return z(t) [m]."""
         insertion = self.scene.insertion
         if insertion.kind == "profile":
-            return float(as_function(insertion.depth).value(time))
+            return float(self._source.value(time))
         if time >= self.rests_from and insertion.final_depth is not None:
             return insertion.final_depth
         return self._unstopped(time)
@@ -55,10 +55,10 @@ class DepthLaw:
         """Return dz/dt from the right [m/s]."""
         insertion = self.scene.insertion
         if insertion.kind == "profile":
-            return float(as_function(insertion.depth).derivative(time))
+            return float(self._source.derivative(time))
         if insertion.kind == "hold" or time >= self.rests_from:
             return 0.0
-        return float(as_function(insertion.speed).value(time))
+        return float(self._source.value(time))
 
     def acceleration(self, time: float) -> float:
         """Return the second derivative of z from the right, without the jumps of speed [m/s^2]."""
@@ -66,8 +66,8 @@ class DepthLaw:
         if insertion.kind == "hold" or time >= self.rests_from:
             return 0.0
         if insertion.kind == "speed":
-            return float(as_function(insertion.speed).derivative(time))
-        return second_derivative(as_function(insertion.depth), time)
+            return float(self._source.derivative(time))
+        return second_derivative(self._source, time)
 
     def after(self, time: float) -> Instant:
         """Return the motion just after a time."""
@@ -80,9 +80,7 @@ class DepthLaw:
 
     def kinks(self, duration: float) -> tuple[float, ...]:
         """Return the times in (0, duration) where the speed or its slope jumps [s]."""
-        insertion = self.scene.insertion
-        source = {"hold": 0.0, "speed": insertion.speed, "profile": insertion.depth}[insertion.kind]
-        times = {time for time in as_function(source).breakpoints if time < self.rests_from}
+        times = {time for time in self._source.breakpoints if time < self.rests_from}
         return tuple(sorted(time for time in times | {self.rests_from} if 0 < time < duration))
 
     def crossings(self, level: float, duration: float) -> tuple[float, ...]:
@@ -97,17 +95,22 @@ class DepthLaw:
         middles = [0.5 * (first + second) for first, second in pairwise(times)]
         return max(abs(self.speed(time)) for time in [*times, *middles])
 
+    @property
+    def _source(self) -> TimeFunction:
+        """The scene's depth (profile) or speed as a function of time."""
+        insertion = self.scene.insertion
+        source = insertion.depth if insertion.kind == "profile" else insertion.speed
+        return as_function(0.0 if source is None else source)
+
     def _unstopped(self, time: float) -> float:
         insertion = self.scene.insertion
         if insertion.kind == "hold":
             return insertion.first_depth
-        return insertion.first_depth + float(as_function(insertion.speed).integral(time))
+        return insertion.first_depth + float(self._source.integral(time))
 
     def _monotone_pieces(self, duration: float) -> list[float]:
         """Times between which the depth rises or falls throughout."""
-        insertion = self.scene.insertion
-        marks = {0.0, duration, *self.kinks(duration)}
-        source = insertion.depth if insertion.kind == "profile" else insertion.speed
+        marks, source = {0.0, duration, *self.kinks(duration)}, self._source
         if isinstance(source, Table):
             marks |= {float(time) for time in source.zeros(duration)}
         if isinstance(source, Sinusoid):

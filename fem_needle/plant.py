@@ -6,8 +6,8 @@ A plant is a linear system whose matrices move with the depth z(t). With coordin
     potential         U = 1/2 q.(K + m G) q - P.(N q) - 1/2 P.B P
     dissipation       c = q'.C q' + 2 v q'.D q + v^2 q.E q                (power lost in the tissue)
 
-where P are the forces at points (guides, lateral loads, tip), N the rows that give the deflection there and B the flexibility of the
-kink that the model's shapes miss inside an element. M, S, R, K, G, C, D, E, N, B depend on z; m(t) is the stiffness factor.
+where P are the forces at points (guides, lateral loads, tip), N the rows that give the deflection there and B the flexibility of
+the kink that the model's shapes miss inside an element. M, S, R, K, G, C, D, E, N, B depend on z; m(t) is the stiffness factor.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +127,7 @@ def _rate_of_coordinates(step: Step, *, at_start: bool) -> Array:
     return np.asarray(_rate(step, [state.coordinates for state in states], at_start=at_start))
 
 
-def _rate(step: Step, values: list, *, at_start: bool):  # type: ignore[no-untyped-def, type-arg]
+def _rate(step: Step, values: list[Any], *, at_start: bool) -> Any:
     """Differentiate the polynomial through the values at the start and at the two nodes."""
     slopes = step.method.start_slope if at_start else step.method.end_slope
     return sum(slope * (value - values[0]) for slope, value in zip(slopes, values[1:], strict=True)) / step.length

@@ -190,7 +190,8 @@ def _run_refined(job: _Job, time_step: float) -> Trajectory:
         coarser, grid = run, replace(grid, time_step=_largest_step(grid) / 2)
     else:
         run.summary["warnings"].append(
-            f"the tolerance {job.scene.numerics.tolerance:g} was not reached with {run.summary['steps']} steps; see error_estimate"
+            f"the tolerance {job.scene.numerics.tolerance:g} was not reached with {run.summary['steps']} steps: "
+            "see error_estimate and relative_energy_residual"
         )
     return _shown(job, run, samples)
 

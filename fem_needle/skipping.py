@@ -46,7 +46,8 @@ def shortest_period(scene: Scene) -> float:
     """Return the shortest period [s] of any sinusoid of the scene, infinity without one."""
     insertion = scene.insertion
     sources = [scene.support.hub_deflection, scene.support.hub_angle, scene.tissue.stiffness_factor]
-    sources += [insertion.speed, insertion.depth, *(getattr(load, "force", None) for load in scene.loads)]
+    sources += [value for value in (insertion.speed, insertion.depth) if value is not None]
+    sources += [load.force for load in scene.loads if load.force is not None]
     rates = [abs(source.frequency) for source in sources if isinstance(source, Sinusoid)]
     return 1.0 / max(rates) if rates and max(rates) > 0 else float("inf")
 
@@ -63,7 +64,7 @@ def inertia_effect(plant: Plant) -> float:
         return float("inf")
     pieces = _pilot(plant)
     tips = [abs(float(plant.points(s.depth).rows[-1] @ s.coordinates)) for piece in pieces for s in piece]
-    largest = max(max(tips), scene.numerics.absolute_tolerance)
+    largest = max(*tips, scene.numerics.absolute_tolerance)
     forced = max((_forced_effect(plant, piece) for piece in pieces), default=0.0)
     rates = [_end_rates(piece) for piece in pieces]
     starts = [piece[0] for piece in pieces]

@@ -4,8 +4,8 @@ In momentum form, with P = M q' + v S q,
 
     P' = v S^T q' + v^2 R q - (K + m G) q - C q' - v D q + N.forces
 
-no derivative of the matrices and none of the speed appears, and P is what stays continuous at a jump of speed. The unknowns are the
-free coordinates at the stages; guides add their forces as multipliers.
+no derivative of the matrices and none of the speed appears, and P is what stays continuous at a jump of speed. The unknowns are
+the free coordinates at the stages; guides add their forces as multipliers.
 """
 
 from __future__ import annotations
@@ -125,11 +125,9 @@ def _add_first_order(block: Array, stages: tuple[Stage, Stage], row: int, column
     operators, speed = stages[row].operators, stages[row].instant.speed
     if operators.damping is not None:
         block = block + slope * operators.damping
-    if operators.convection is not None and (speed or stages[column].instant.speed):
-        other = stages[column].operators.convection
-        block = block + slope * (
-            stages[column].instant.speed * other - speed * banded.transpose(operators.convection)
-        )
+    other, other_speed = stages[column].operators.convection, stages[column].instant.speed
+    if operators.convection is not None and other is not None and (speed or other_speed):
+        block = block + slope * (other_speed * other - speed * banded.transpose(operators.convection))
     if row == column and speed:
         if operators.drag is not None:
             block = block + speed * operators.drag
@@ -219,4 +217,4 @@ def _guide_forces(
         compliance[block, block] += points.flexibility[:guides, :guides] + np.diag(points.guide_compliance)
         gaps[block] += points.rows[:guides] @ bases[number][0]
         gaps[block] += points.flexibility[:guides, guides:] @ stage.case.forces
-    return -np.linalg.solve(compliance, gaps).reshape(2, guides)
+    return np.asarray(np.linalg.solve(compliance, -gaps), dtype=float).reshape(2, guides)

@@ -125,7 +125,7 @@ def solve_guided(
         return result, np.zeros(0)
     reached = answers[:, 1:]
     compliance = rows @ reached + points.flexibility[:guides, :guides] + np.diag(points.guide_compliance)
-    reactions = -np.linalg.solve(compliance, rows @ answers[:, 0] + gap)
+    reactions = np.asarray(np.linalg.solve(compliance, -(rows @ answers[:, 0] + gap)), dtype=float)
     result[clamped:] += reached @ reactions
     return result, reactions
 
@@ -171,8 +171,8 @@ def check_force_sum(rest: Equilibrium) -> Equilibrium:
     largest = max(abs(force) for force in forces)
     if abs(sum(forces)) > FORCE_SUM_TOLERANCE * largest:
         raise ComputationError(
-            f"forces do not balance at time {rest.time:g} s, depth {rest.depth:g} m: their sum is {sum(forces):.3g} N, the largest "
-            f"{largest:.3g} N; round-off: use fewer elements"
+            f"forces do not balance at time {rest.time:g} s, depth {rest.depth:g} m: their sum is {sum(forces):.3g} N, "
+            f"the largest {largest:.3g} N; round-off: use fewer elements"
         )
     return rest
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import inf, nextafter
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,9 @@ class Step:
 class Stepper(Protocol):
     """Advance a state over one smooth step."""
 
-    inertia: bool
+    @property
+    def inertia(self) -> bool:
+        """Whether the needle's inertia acts."""
 
     def start(self, law: DepthLaw, time: float, until: float, before: StepEnd) -> StepEnd:
         """Return the state just after a time, given the state just before."""
@@ -108,17 +110,21 @@ class DynamicStepper:
         system = _reusable(last, stages, length) or factor_step(self.plant, stages, self.method, length)
         begin = start.solution
         solutions = solve_step(self.plant, stages, self.method, length, system, begin.coordinates, begin.momentum)
-        weights = self.method.end
-        end_coordinates, end_momentum = (
-            getattr(begin, name) + sum(w * (getattr(s, name) - getattr(begin, name)) for w, s in zip(weights, solutions, strict=True))
-            for name in ("coordinates", "momentum")
-        )
+        end_coordinates = self._extrapolated(begin.coordinates, [state.coordinates for state in solutions])
+        end_momentum = self._extrapolated(begin.momentum, [state.momentum for state in solutions])
         case = self._loads(middle, nextafter(until, time), stages[1])
         stage = evaluate_stage(self.plant, law.before(until), case, stages[1])
         end_coordinates[: self.plant.prescribed] = case.clamp[: self.plant.prescribed]
         forces = np.concatenate([self._end_reactions(stage, end_coordinates, solutions), case.forces])
         end = self._state(stage, end_coordinates, end_momentum, forces)
         return Step(self.method, length, (start, end), stages, solutions, system)
+
+    def _extrapolated(self, start: Array, values: list[Array]) -> Array:
+        """Return the value at the end of the polynomial through the start and the nodes."""
+        result = start.copy()
+        for weight, value in zip(self.method.end, values, strict=True):
+            result += weight * (value - start)
+        return result
 
     def _loads(self, depth: float, time: float, earlier: Stage) -> LoadCase:
         """Return the loads; the earlier ones where nothing can have changed."""
@@ -176,7 +182,7 @@ class Massless:
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
 
-    def __getattr__(self, name: str) -> object:
+    def __getattr__(self, name: str) -> Any:
         return getattr(self._plant, name)
 
     def operators(self, depth: float, time: float) -> Operators:
@@ -195,7 +201,7 @@ class StaticStepper:
 
     plant: Plant
     inertia: bool = False
-    method: Collocation = gauss(3)
+    method: Collocation = field(default_factory=lambda: gauss(3))
 
     def start(self, law: DepthLaw, time: float, until: float, before: StepEnd) -> StepEnd:
         """Return the equilibrium just after a time."""

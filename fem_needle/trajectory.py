@@ -124,14 +124,15 @@ class Trajectory:
 
     def save(self, folder: str | Path, *, force: bool = False) -> Path:
         """Write a run folder (docs/contract.md); refuse an existing one unless ``force``."""
-        from fem_needle.run_folder import save_run  # noqa: PLC0415 (the folder's room is above this one)
+        # The folder's room is above this one.
+        from fem_needle.run_folder import save_run
 
         return save_run(self, Path(folder), force=force)
 
     @staticmethod
     def load(folder: str | Path) -> Trajectory:
         """Read a run folder."""
-        from fem_needle.run_folder import load_run  # noqa: PLC0415
+        from fem_needle.run_folder import load_run
 
         return load_run(Path(folder))
 
@@ -139,7 +140,10 @@ class Trajectory:
 def trajectory_from_samples(
     plant: Plant, samples: Sequence[Sample], summary: dict[str, Any], scene: Scene | None = None
 ) -> Trajectory:
-    """Collect samples, in order of time, into a trajectory; ``scene`` holds the run's settings where they differ from the plant's."""
+    """Collect samples, in order of time, into a trajectory.
+
+    ``scene`` holds the run's settings where they differ from those of the plant's own scene.
+    """
     scene, length = scene or plant.scene, plant.scene.needle.length
     stations = np.linspace(0.0, length, scene.numerics.output_points)
     shapes = np.stack([plant.deflection(s.coordinates, s.point_forces, s.depth, stations) for s in samples])

@@ -27,7 +27,7 @@ def register(application: typer.Typer) -> None:
     application.command("run")(run)
 
 
-def run(  # noqa: PLR0917 (one argument for each option of the command)
+def run(
     scene: SceneArgument,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Run folder; by default runs/<name>, then runs/<name>-2, ...")

@@ -23,7 +23,7 @@ _POINTS = 6
 class IntervalIntegrals:
     """Integrals of one product of shapes, ready to be added over intervals of the mesh.
 
-    ``mass``: psi_i psi_j; ``drag``: x^p psi_i psi_j'; ``slip``: x^(2 p) psi_i' psi_j'; ``bending``: psi_i'' psi_j''. With p = 0 or 1.
+    ``mass``: psi_i psi_j; ``drag``: x^p psi_i psi_j'; ``slip``: x^(2 p) psi_i' psi_j'; ``bending``: psi_i'' psi_j''; p is 0 or 1.
 
     Attributes
     ----------
