@@ -12,13 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
-from fem_needle.elements.integrals import IntervalIntegrals, Kind, interval_integrals
+from fem_needle.elements.integrals import IntervalIntegrals, Kind, gauss_rule, interval_integrals
 from fem_needle.elements.mesh import LineMesh
 from fem_needle.frames import Frame
+from fem_needle.path import CutPath
+from fem_needle.plant import RestTerms, no_rest_terms
 from fem_needle.scene import Layer
 from fem_needle.segments import Segment, inserted_segments
 
 Array = NDArray[np.float64]
+
+PATH_POINTS = 4  # exact for a cubic piece of the path times a quartic shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +80,45 @@ class Foundation:
                     row = self.mesh.row(frame.position(y, depth))
                     result += rate * (row @ coordinates) * row
         return result
+
+    def rest_terms(self, path: CutPath, depth: float, lower: float, upper: float) -> RestTerms:
+        """Integrate the rest line exactly over lower <= y < upper.
+
+        Split at nodes, layers and the path's own pieces, four Gauss points on each part. With r at fixed y and x(y; z) the
+        place on the mesh, dH/dz = k r psi at the tip + integral k r psi' dx/dz dy; the tip counts where it lies in the range.
+        """
+        total = no_rest_terms(self.mesh.size)
+        for segment in inserted_segments(self.layers, depth):
+            modulus = self.layers[segment.layer].foundation_modulus
+            start, end = max(segment.start, path.edges[0], lower), min(segment.end, upper)
+            if modulus and end > start:
+                total = total + self._path_between(path, depth, modulus, start, end)
+            if modulus and segment.ends_at_tip and lower <= depth < upper:
+                tip = float(path.value(np.array(depth)))
+                row = self.mesh.row(self.frame.position(depth, depth))
+                zero = np.zeros(self.mesh.size)
+                total = total + RestTerms(zero, modulus * tip * row, 0.0, 0.5 * modulus * tip**2)
+        return total
+
+    def _path_between(self, path: CutPath, depth: float, modulus: float, start: float, end: float) -> RestTerms:
+        y, weights = self._gauss_points(start, end, path.edges, depth)
+        rest = path.value(y)
+        force = modulus * weights * rest
+        x, moves = self.frame.positions(y, depth)
+        load, rate = self.mesh.weighted_sum(x, force), self.mesh.weighted_sum(x, force * moves, 1)
+        return RestTerms(load, rate, 0.5 * float(force @ rest), 0.0)
+
+    def _gauss_points(
+        self, start: float, end: float, edges: Array, depth: float
+    ) -> tuple[Array, Array]:
+        """Return points [m] and weights over y from start to end, split at nodes and at the path's edges."""
+        stretch = self.frame.stretch(depth)
+        nodes = depth - stretch * (self.mesh.nodes[-1] - self.mesh.nodes)
+        cuts = np.unique(np.concatenate([[start, end], nodes, edges]))
+        cuts = cuts[(cuts >= start) & (cuts <= end)]
+        points, weights = gauss_rule(PATH_POINTS)
+        sizes = np.diff(cuts)[:, None]
+        return (cuts[:-1, None] + sizes * points).ravel(), (sizes * weights).ravel()
 
     def damping(self, depth: float) -> tuple[Array, Array, Array] | tuple[None, None, None]:
         """Return C, D, E of the viscosity on dw/dt at fixed y, or Nones without viscosity."""

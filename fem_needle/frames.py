@@ -9,6 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
 
 class Frame(Protocol):
     """Map from y to the mesh."""
@@ -18,6 +23,9 @@ class Frame(Protocol):
 
     def position_rate(self, y: float, depth: float) -> float:
         """Return d(position)/dz at a fixed y."""
+
+    def positions(self, y: Array, depth: float) -> tuple[Array, Array]:
+        """Return the places of points on the needle, the tip excluded, and their rates by depth."""
 
     def stretch(self, depth: float) -> float:
         """Return dy / d(position)."""
@@ -47,6 +55,10 @@ class MaterialFrame:
         """Return -1, or 0 at the tip, which moves with the mesh."""
         return 0.0 if y >= depth else -1.0
 
+    def positions(self, y: Array, depth: float) -> tuple[Array, Array]:
+        """Return s and -1."""
+        return y + (self.length - depth), np.full(y.shape, -1.0)
+
     def stretch(self, depth: float) -> float:
         """Return 1."""
         return 1.0
@@ -66,6 +78,10 @@ class StretchedFrame:
     def position_rate(self, y: float, depth: float) -> float:
         """Return -xi / z, or 0 at the tip."""
         return 0.0 if y >= depth else -y / depth**2
+
+    def positions(self, y: Array, depth: float) -> tuple[Array, Array]:
+        """Return xi and -xi / z."""
+        return y / depth, -y / depth**2
 
     def stretch(self, depth: float) -> float:
         """Return z [m]."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fem_needle.ledger import StepEnd
 from fem_needle.loads import LoadCase, load_case
 from fem_needle.motion import DepthLaw
+from fem_needle.path import straight_path
 from fem_needle.plant import Plant
 from fem_needle.stages import Stage, StageSolution, evaluate_stage, momentum, trivial_solution
 from fem_needle.statics import depth_derivative, solve_static, static_state
@@ -25,9 +26,15 @@ def initial_state(plant: Plant, law: DepthLaw) -> StepEnd:
     """
     scene = plant.scene
     case = load_case(scene, law.depth(0.0), 0.0)
-    stage = evaluate_stage(plant, law.after(0.0), case)
+    path = straight_path(law.depth(0.0)) if scene.tissue.rest_line == "cut-path" else None
+    stage = evaluate_stage(plant, law.after(0.0), case, path=path)
+    return StepEnd(stage, _initial_solution(plant, law, stage), path)
+
+
+def _initial_solution(plant: Plant, law: DepthLaw, stage: Stage) -> StageSolution:
+    scene, case = plant.scene, stage.case
     if law.depth(0.0) < plant.smallest_depth:
-        return StepEnd(stage, trivial_solution(plant, stage))
+        return trivial_solution(plant, stage)
     if scene.initial.shape == "equilibrium":
         return _moving_equilibrium(plant, law, stage)
     if scene.initial.shape == "straight":
@@ -36,16 +43,16 @@ def initial_state(plant: Plant, law: DepthLaw) -> StepEnd:
         coordinates = _tip_displaced(plant, stage, float(scene.initial.tip_deflection or 0.0))
     zero = np.zeros(plant.size)
     reactions = np.zeros(stage.points.guides)
-    return StepEnd(stage, StageSolution(coordinates, zero, zero, np.concatenate([reactions, case.forces])))
+    return StageSolution(coordinates, zero, zero, np.concatenate([reactions, case.forces]))
 
 
-def _moving_equilibrium(plant: Plant, law: DepthLaw, stage: Stage) -> StepEnd:
+def _moving_equilibrium(plant: Plant, law: DepthLaw, stage: Stage) -> StageSolution:
     rest = solve_static(plant, depth=law.depth(0.0), time=0.0)
     velocities = np.zeros(plant.size)
     if stage.instant.speed:
         velocities = stage.instant.speed * depth_derivative(plant, rest)[0]
     start = momentum(stage, rest.coordinates, velocities)
-    return StepEnd(stage, StageSolution(rest.coordinates, velocities, start, rest.point_forces))
+    return StageSolution(rest.coordinates, velocities, start, rest.point_forces)
 
 
 def _tip_displaced(plant: Plant, stage: Stage, tip_deflection: float) -> Array:

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from fem_needle import banded
 from fem_needle.collocation import Collocation
-from fem_needle.plant import Plant
+from fem_needle.path import CutPath
+from fem_needle.plant import Plant, RestTerms
 from fem_needle.stages import Stage, StageSolution, internal_force
 
 Array = NDArray[np.float64]
@@ -79,7 +80,15 @@ def potential_energies(stage: Stage, coordinates: Array, forces: Array) -> tuple
     bending = form(operators.bending, coordinates, coordinates) + float(forces @ points.flexibility @ forces)
     reactions = forces[: points.guides]
     guide = 0.5 * float(reactions @ (points.guide_compliance * reactions))
-    return 0.5 * bending, 0.5 * form(operators.tissue, coordinates, coordinates) + guide, guide
+    tissue = 0.5 * form(operators.tissue, coordinates, coordinates)
+    if stage.rest is not None:
+        tissue += stage.factor * rest_energy(stage.rest, coordinates)
+    return 0.5 * bending, tissue + guide, guide
+
+
+def rest_energy(rest: RestTerms, coordinates: Array) -> float:
+    """Return c - q.H, what a cut path adds to 1/2 q.G q [J]."""
+    return rest.constant - float(coordinates @ rest.load)
 
 
 def axial_momentum(stage: Stage, coordinates: Array, velocities: Array) -> float:
@@ -96,6 +105,8 @@ def configuration_force(plant: Plant, stage: Stage, solution: StageSolution, *, 
     force = -0.5 * float(
         coordinates @ plant.stiffness_rate_product(coordinates, instant.depth, instant.time)
     )
+    if stage.rest is not None:
+        force += stage.factor * (float(coordinates @ stage.rest.load_rate) - stage.rest.constant_rate)
     force += float(forces @ (points.row_rates @ coordinates) + 0.5 * forces @ points.flexibility_rate @ forces)
     if inertia:
         force += plant.kinetic_rate(velocities, coordinates, instant.depth, instant.speed)
@@ -115,10 +126,11 @@ def dissipation(stage: Stage, solution: StageSolution) -> float:
 
 @dataclass(frozen=True, eq=False)
 class StepEnd:
-    """One end of a step: the plant there and the state on it."""
+    """One end of a step: the plant there, the state on it, and the path cut so far (None: straight rest line)."""
 
     stage: Stage
     solution: StageSolution
+    path: CutPath | None = None
 
 
 def step_works(
@@ -153,6 +165,8 @@ def step_works(
             load -= weight * float(stage.case.force_rates @ reached)
         hub += weight * _hub_power(stage, solution, inertia=inertia)
         swelling += weight * 0.5 * form(stage.operators.tissue_rate, solution.coordinates, solution.coordinates)
+        if stage.rest is not None and stage.factor_rate:
+            swelling += weight * stage.factor_rate * rest_energy(stage.rest, solution.coordinates)
         if stage.operators.damping is not None:
             lost += weight * dissipation(stage, solution)
         if instant.speed:

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, nextafter
 
-import numpy as np
 from scipy.optimize import brentq
 
 from fem_needle.loads import second_derivative
 from fem_needle.scene import LateralLoad, Scene, Sinusoid, Table, TimeFunction, TipLoad, as_function
 from fem_needle.segments import interfaces
-
-MONOTONE_PIECES = 64  # per period of a sinusoid, in the search for crossings of a depth
 
 
 @dataclass(frozen=True)
@@ -83,6 +80,15 @@ class DepthLaw:
         times = {time for time in self._source.breakpoints if time < self.rests_from}
         return tuple(sorted(time for time in times | {self.rests_from} if 0 < time < duration))
 
+    def turning_times(self, duration: float) -> tuple[float, ...]:
+        """Return the times in (0, duration) at which the needle may turn round [s]."""
+        source = self._source
+        if not isinstance(source, Table | Sinusoid):
+            return ()
+        is_profile = self.scene.insertion.kind == "profile"
+        times = source.turning_points(duration) if is_profile else source.zeros(duration)
+        return tuple(float(time) for time in times if time < self.rests_from)
+
     def crossings(self, level: float, duration: float) -> tuple[float, ...]:
         """Return the times in (0, duration) at which the depth passes a level [m]."""
         return tuple(
@@ -110,12 +116,7 @@ class DepthLaw:
 
     def _monotone_pieces(self, duration: float) -> list[float]:
         """Times between which the depth rises or falls throughout."""
-        marks, source = {0.0, duration, *self.kinks(duration)}, self._source
-        if isinstance(source, Table):
-            marks |= {float(time) for time in source.zeros(duration)}
-        if isinstance(source, Sinusoid):
-            count = int(np.ceil(duration * source.frequency * MONOTONE_PIECES)) + 1
-            marks |= set(np.linspace(0.0, duration, count + 1).tolist())
+        marks = {0.0, duration, *self.kinks(duration), *self.turning_times(duration)}
         return sorted(time for time in marks if 0 <= time <= duration)
 
 
@@ -142,6 +143,10 @@ def landing_times(scene: Scene, law: DepthLaw, duration: float, smallest_depth: 
     levels = [level for level in interfaces(scene.tissue.layers) if level > 0]
     if smallest_depth:
         levels.append(smallest_depth)
+    if scene.tissue.rest_line == "cut-path":  # where the needle turns, and where it reaches uncut tissue again
+        turns = law.turning_times(duration)
+        times |= set(turns)
+        levels += [law.depth(time) for time in turns]
     for level in levels:
         times |= set(law.crossings(level, duration))
     return tuple(sorted(times))

@@ -19,7 +19,8 @@ from fem_needle.elements.mesh import LineMesh, uniform_mesh
 from fem_needle.errors import SceneError
 from fem_needle.foundation import Foundation
 from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
-from fem_needle.plant import Operators, Points
+from fem_needle.path import CutPath
+from fem_needle.plant import Operators, Points, RestTerms
 from fem_needle.scene import Guide, LateralLoad, Scene, as_function
 
 Array = NDArray[np.float64]
@@ -106,6 +107,10 @@ class FiniteElementNeedle:
         if self.frame.stretch_rate:
             result += banded.multiply(self._beam.bending, coordinates) * (-3 / depth**4)
         return result
+
+    def rest_terms(self, path: CutPath, depth: float, lower: float, upper: float) -> RestTerms:
+        """Return what the cut path at lower <= y < upper adds to the tissue's energy, for a stiffness factor of 1."""
+        return self.foundation.rest_terms(path, depth, lower, upper)
 
     def kinetic_rate(self, velocities: Array, coordinates: Array, depth: float, speed: float) -> float:
         """Return dT/dz [N]: M grows with the depth and R falls with it under ``entry``; 0 under ``hub``."""

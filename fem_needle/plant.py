@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
+from fem_needle.path import CutPath
 from fem_needle.scene import Scene
 
 Array = NDArray[np.float64]
@@ -63,6 +64,38 @@ class Operators:
     def mass_factorization(self) -> banded.Factorization:
         """Factors of the mass matrix of the coordinates that are not clamped."""
         return banded.Factorization(banded.trailing(self.mass, self.clamped))
+
+
+@dataclass(frozen=True, eq=False)
+class RestTerms:
+    """What a rest line r(y) adds to the tissue's energy: 1/2 sum k integral (w - r)^2 = 1/2 q.G q - q.H + c.
+
+    Attributes
+    ----------
+    load, load_rate
+        H = sum k integral r psi and dH/dz.
+    constant, constant_rate
+        c = 1/2 sum k integral r^2 [J] and dc/dz [N].
+    """
+
+    load: Array
+    load_rate: Array
+    constant: float
+    constant_rate: float
+
+    def __add__(self, other: RestTerms) -> RestTerms:
+        """Add two parts of a rest line."""
+        return RestTerms(
+            self.load + other.load,
+            self.load_rate + other.load_rate,
+            self.constant + other.constant,
+            self.constant_rate + other.constant_rate,
+        )
+
+
+def no_rest_terms(size: int) -> RestTerms:
+    """Return the terms of no rest line at all."""
+    return RestTerms(np.zeros(size), np.zeros(size), 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +160,9 @@ class Plant(Protocol):
 
     def stiffness_rate_product(self, coordinates: Array, depth: float, time: float) -> Array:
         """Return d(K + m G)/dz q at a fixed time."""
+
+    def rest_terms(self, path: CutPath, depth: float, lower: float, upper: float) -> RestTerms:
+        """Return what the cut path at lower <= y < upper adds to the tissue's energy, for a stiffness factor of 1."""
 
     def kinetic_rate(self, velocities: Array, coordinates: Array, depth: float, speed: float) -> float:
         """Return dT/dz [N] at fixed coordinates, velocities and speed."""

@@ -114,6 +114,8 @@ def _reactions(plant: Plant, step: Step, end: StepEnd, *, at_start: bool, inerti
             tissue = tissue + stage.instant.speed * banded.multiply(stage.operators.drag, solution.coordinates)
     clamp = np.zeros(2)
     clamp[:clamped] = needed[:clamped]
+    if stage.rest is not None:
+        tissue = tissue - stage.factor * stage.rest.load
     return clamp, -float(plant.deflection_at_one @ tissue)
 
 

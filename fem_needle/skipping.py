@@ -36,8 +36,9 @@ class Skipped:
 
 
 def inertia_free_stepper(plant: Plant) -> Stepper:
-    """Return equilibria where the tissue is elastic, creep (L-stable) where it is viscous."""
-    if any(layer.damping > 0 for layer in plant.scene.tissue.layers):
+    """Return equilibria where the tissue has no memory, creep (L-stable) where it is viscous or remembers a path."""
+    tissue = plant.scene.tissue
+    if tissue.rest_line == "cut-path" or any(layer.damping > 0 for layer in tissue.layers):
         return DynamicStepper(Massless(plant), collocation(0.0), inertia=False)
     return StaticStepper(plant)
 

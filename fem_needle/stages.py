@@ -10,7 +10,8 @@ the free coordinates at the stages; guides add their forces as multipliers.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,19 +20,36 @@ from fem_needle import banded
 from fem_needle.collocation import Collocation
 from fem_needle.loads import LoadCase
 from fem_needle.motion import Instant
-from fem_needle.plant import Operators, Plant, Points
+from fem_needle.path import CutPath
+from fem_needle.plant import Operators, Plant, Points, RestTerms
+from fem_needle.scene import as_function
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Everything of a plant at one instant."""
+    """Everything of a plant at one instant.
+
+    Attributes
+    ----------
+    instant
+        The insertion's motion.
+    operators, points, case
+        Matrices, points and loads.
+    rest
+        What the cut path adds; None for a straight rest line.
+    factor, factor_rate
+        The tissue's stiffness factor, by which ``rest`` is to be multiplied, and its rate.
+    """
 
     instant: Instant
     operators: Operators
     points: Points
     case: LoadCase
+    rest: RestTerms | None = None
+    factor: float = 1.0
+    factor_rate: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +62,9 @@ class StageSolution:
     forces: Array
 
 
-def evaluate_stage(plant: Plant, instant: Instant, case: LoadCase, earlier: Stage | None = None) -> Stage:
+def evaluate_stage(
+    plant: Plant, instant: Instant, case: LoadCase, earlier: Stage | None = None, path: CutPath | None = None
+) -> Stage:
     """Return the plant's matrices at an instant; those of an earlier stage serve again where nothing moved."""
     instant = replace(instant, depth=max(instant.depth, plant.smallest_depth))
     if (
@@ -52,8 +72,35 @@ def evaluate_stage(plant: Plant, instant: Instant, case: LoadCase, earlier: Stag
         and earlier.instant.depth == instant.depth
         and isinstance(plant.scene.tissue.stiffness_factor, float)
     ):
-        return Stage(instant, earlier.operators, earlier.points, case)
-    return Stage(instant, plant.operators(instant.depth, instant.time), plant.points(instant.depth), case)
+        stage = Stage(instant, earlier.operators, earlier.points, case)
+    else:
+        stage = Stage(instant, plant.operators(instant.depth, instant.time), plant.points(instant.depth), case)
+    return stage if path is None else with_path(plant, stage, path)
+
+
+def with_path(plant: Plant, stage: Stage, path: CutPath, history: PathHistory | None = None) -> Stage:
+    """Return the stage with the tissue's springs resting on a path; what lies behind a step's start comes from its history."""
+    swelling = as_function(plant.scene.tissue.stiffness_factor)
+    time, depth = stage.instant.time, stage.instant.depth
+    if history is None:
+        rest = plant.rest_terms(path, depth, -inf, inf)
+    else:
+        rest = history.at(plant, depth) + plant.rest_terms(path, depth, history.path.deepest, inf)
+    return replace(stage, rest=rest, factor=swelling.value(time), factor_rate=swelling.derivative(time))
+
+
+@dataclass(frozen=True, eq=False)
+class PathHistory:
+    """The path behind a step's start, integrated once for each depth of the step while the iteration goes on."""
+
+    path: CutPath
+    _known: dict[float, RestTerms] = field(default_factory=dict)
+
+    def at(self, plant: Plant, depth: float) -> RestTerms:
+        """Return the terms at a depth [m]."""
+        if depth not in self._known:
+            self._known[depth] = plant.rest_terms(self.path, depth, -inf, self.path.deepest)
+        return self._known[depth]
 
 
 def momentum(stage: Stage, coordinates: Array, velocities: Array) -> Array:
@@ -78,6 +125,8 @@ def internal_force(stage: Stage, coordinates: Array, velocities: Array) -> Array
     """Return v S^T q' + v^2 R q - (K + m G) q - C q' - v D q, the rate of P without the point forces."""
     operators, speed = stage.operators, stage.instant.speed
     result = -banded.multiply(operators.stiffness, coordinates)
+    if stage.rest is not None:
+        result += stage.factor * stage.rest.load
     if operators.damping is not None:
         result -= banded.multiply(operators.damping, velocities)
     if speed and operators.drag is not None:

@@ -16,8 +16,10 @@ from fem_needle.collocation import Collocation, gauss
 from fem_needle.ledger import StepEnd
 from fem_needle.loads import LoadCase, is_steady, load_case
 from fem_needle.motion import DepthLaw
+from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Plant
 from fem_needle.stages import (
+    PathHistory,
     Stage,
     StageSolution,
     StepSystem,
@@ -27,10 +29,14 @@ from fem_needle.stages import (
     solve_step,
     trivial_solution,
     velocities_of,
+    with_path,
 )
 from fem_needle.statics import static_state
 
 Array = NDArray[np.float64]
+
+MOST_PATH_ITERATIONS = 50
+PATH_TOLERANCE = 1e-13  # of the largest tip deflection of the step
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +79,9 @@ class Stepper(Protocol):
         """Return the step from a state to a time."""
 
 
+_Cut = tuple[PathHistory, Array]  # the path behind the step and the tips at its nodes
+
+
 @dataclass(frozen=True, eq=False)
 class DynamicStepper:
     """Collocation in momentum form (`stages`), with or without inertia.
@@ -100,24 +109,67 @@ class DynamicStepper:
         middle = law.depth(0.5 * (time + until))
         stage = evaluate_stage(self.plant, law.after(time), self._loads(middle, time, before.stage), before.stage)
         solution = before.solution
-        return self._state(stage, solution.coordinates, solution.momentum, solution.forces)
+        path = before.path
+        if path is not None:
+            stage = with_path(self.plant, stage, path)
+        return self._state(stage, solution.coordinates, solution.momentum, solution.forces, path)
 
     def advance(self, law: DepthLaw, start: StepEnd, until: float, last: Step | None) -> Step:
-        """Solve the stages and extrapolate their polynomial to the end."""
+        """Solve the stages and extrapolate their polynomial to the end.
+
+        Where the tip cuts a path, the path under the stages depends on their own tips: solved by iteration, which contracts by about
+        the step's advance over the tissue's characteristic length.
+        """
+        if start.path is None:
+            return self._attempt(law, start, until, last, None)
+        history, tips = PathHistory(start.path), self._predicted_tips(start, until, last)
+        for _ in range(MOST_PATH_ITERATIONS):
+            last = self._attempt(law, start, until, last, (history, tips))
+            found = np.array([self._tip(*pair) for pair in zip(last.stages, last.solutions, strict=True)])
+            if np.max(np.abs(found - tips)) <= PATH_TOLERANCE * np.max(np.abs(found)):
+                return last
+            tips = found
+        raise FloatingPointError("the cut path does not converge")
+
+    def _attempt(self, law: DepthLaw, start: StepEnd, until: float, last: Step | None, cut: _Cut | None) -> Step:
+        """Solve one step, with the path cut through given tips at the nodes where there is one."""
         time = start.stage.instant.time
         length, middle = until - time, law.depth(0.5 * (time + until))
-        stages = self._stages(law, start.stage, time, until)
+        stages = self._stages(law, start, until, last, cut)
         system = _reusable(last, stages, length) or factor_step(self.plant, stages, self.method, length)
         begin = start.solution
         solutions = solve_step(self.plant, stages, self.method, length, system, begin.coordinates, begin.momentum)
         end_coordinates = self._extrapolated(begin.coordinates, [state.coordinates for state in solutions])
         end_momentum = self._extrapolated(begin.momentum, [state.momentum for state in solutions])
         case = self._loads(middle, nextafter(until, time), stages[1])
-        stage = evaluate_stage(self.plant, law.before(until), case, stages[1])
         end_coordinates[: self.plant.prescribed] = case.clamp[: self.plant.prescribed]
+        stage = evaluate_stage(self.plant, law.before(until), case, stages[1])
+        path = start.path
+        if path is not None and cut is not None:
+            depths, (history, tips) = [*(s.instant.depth for s in stages), stage.instant.depth], cut
+            path = self._cut(start, path, depths, [*tips, float(stage.points.rows[-1] @ end_coordinates)])
+            stage = with_path(self.plant, stage, path, history)
         forces = np.concatenate([self._end_reactions(stage, end_coordinates, solutions), case.forces])
-        end = self._state(stage, end_coordinates, end_momentum, forces)
+        end = self._state(stage, end_coordinates, end_momentum, forces, path)
         return Step(self.method, length, (start, end), stages, solutions, system)
+
+    def _predicted_tips(self, start: StepEnd, until: float, last: Step | None) -> Array:
+        """Return the tips at the nodes as the last step's polynomial continues, the present tip without one."""
+        tip, length = self._tip(start.stage, start.solution), until - start.stage.instant.time
+        if last is None:
+            return np.full(len(self.method.nodes), tip)
+        found = [self._tip(*pair) for pair in zip(last.stages, last.solutions, strict=True)]
+        rate = sum(w * (value - self._tip(last.ends[0].stage, last.ends[0].solution)) for w, value in zip(self.method.end_slope, found, strict=True))
+        return tip + float(rate) / last.length * self.method.nodes * length
+
+    def _cut(self, start: StepEnd, path: CutPath, depths: list[float], tips: list[float]) -> CutPath:
+        """Return the path after the tip has passed given depths with given deflections."""
+        if depths[-1] < path.deepest:
+            return path
+        return path.extended([start.stage.instant.depth, *depths], [self._tip(start.stage, start.solution), *tips])
+
+    def _tip(self, stage: Stage, solution: StageSolution) -> float:
+        return float(stage.points.rows[-1] @ solution.coordinates)
 
     def _extrapolated(self, start: Array, values: list[Array]) -> Array:
         """Return the value at the end of the polynomial through the start and the nodes."""
@@ -148,32 +200,49 @@ class DynamicStepper:
                 forces[index] = -(float(points.rows[index] @ coordinates) + others) / compliance
         return forces[:guides]
 
-    def _stages(self, law: DepthLaw, earlier: Stage, time: float, until: float) -> tuple[Stage, Stage]:
+    def _stages(
+        self, law: DepthLaw, start: StepEnd, until: float, last: Step | None, cut: _Cut | None
+    ) -> tuple[Stage, Stage]:
+        time, earlier = start.stage.instant.time, start.stage
         length, middle, latest = until - time, law.depth(0.5 * (time + until)), nextafter(until, time)
-        found = []
-        for node in self.method.nodes:
+        found: list[Stage] = []
+        for number, node in enumerate(self.method.nodes):
             instant = law.before(until) if node == 1.0 else law.after(time + node * length)
+            if last is not None and last.stages[number].instant.depth == instant.depth:
+                earlier = last.stages[number]
             # A node at the end belongs to this step: loads and layers just before a kink.
             case = self._loads(middle if node == 1.0 else instant.depth, min(instant.time, latest), earlier)
             earlier = evaluate_stage(self.plant, instant, case, earlier)
             found.append(earlier)
+        if cut is not None and start.path is not None:
+            history, tips = cut
+            depths = [stage.instant.depth for stage in found]
+            whole = self._cut(start, start.path, depths, tips.tolist())
+            found = [
+                with_path(self.plant, stage, whole.seen_from(stage.instant.depth, tip), history)
+                for stage, tip in zip(found, tips.tolist(), strict=True)
+            ]
         return found[0], found[1]
 
-    def _state(self, stage: Stage, coordinates: Array, start_momentum: Array, forces: Array) -> StepEnd:
+    def _state(
+        self, stage: Stage, coordinates: Array, start_momentum: Array, forces: Array, path: CutPath | None
+    ) -> StepEnd:
         if not self.inertia:
-            return StepEnd(stage, StageSolution(coordinates, np.zeros_like(coordinates), start_momentum, forces))
+            return StepEnd(stage, StageSolution(coordinates, np.zeros_like(coordinates), start_momentum, forces), path)
         velocities = velocities_of(self.plant, stage, coordinates, start_momentum)
         full = momentum(stage, coordinates, velocities)
-        return StepEnd(stage, StageSolution(coordinates, velocities, full, forces))
+        return StepEnd(stage, StageSolution(coordinates, velocities, full, forces), path)
 
 
 def _reusable(last: Step | None, stages: tuple[Stage, Stage], length: float) -> StepSystem | None:
     """Return the last step's factors where neither matrices nor step have changed."""
     if last is None or last.system is None or abs(last.length - length) > 1e-12 * length:
         return None
-    same = all(new.operators is old.operators for new, old in zip(stages, last.stages, strict=True))
-    still = not any(stage.instant.speed for stage in (*stages, *last.stages))
-    return last.system if same and still else None
+    same = all(
+        new.operators is old.operators and new.instant.speed == old.instant.speed
+        for new, old in zip(stages, last.stages, strict=True)
+    )
+    return last.system if same else None
 
 
 class Massless:

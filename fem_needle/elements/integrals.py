@@ -75,7 +75,7 @@ class IntervalIntegrals:
 
     def _add_part(self, element: int, start: float, end: float, factor: float, target: Array) -> None:
         length, node = self.mesh.lengths[element], self.mesh.nodes[element]
-        points, weights = _gauss()
+        points, weights = gauss_rule(_POINTS)
         position = start + (end - start) * points
         place = np.minimum(np.maximum((position - node) / length, 0.0), 1.0)
         shapes = self._factors(element, place, position)
@@ -125,6 +125,7 @@ def _element_matrices(mesh: LineMesh, kind: Kind, power: int) -> Array:
 
 
 @lru_cache
-def _gauss() -> tuple[Array, Array]:
-    points, weights = np.polynomial.legendre.leggauss(_POINTS)
+def gauss_rule(count: int) -> tuple[Array, Array]:
+    """Return points and weights on 0..1."""
+    points, weights = np.polynomial.legendre.leggauss(count)
     return (points + 1) / 2, weights / 2

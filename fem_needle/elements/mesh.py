@@ -72,15 +72,24 @@ class LineMesh:
         values = self.reference.unit_shapes(place, derivative)
         return (values.T * (self.scales[element] / self.lengths[element] ** derivative)).T
 
+    def weighted_sum(self, positions: Array, weights: Array, derivative: int = 0) -> Array:
+        """Return the sum over positions of weight times shape, or derivative of it, for every coordinate (size,)."""
+        columns, shapes = self._shapes_at(positions, derivative)
+        return np.bincount(columns.ravel(), (shapes * weights).ravel(), minlength=self.size)
+
     def evaluate(self, coordinates: Array, positions: Array, derivative: int = 0) -> Array:
         """Return values (..., positions) of functions with coordinates (..., size), or of a derivative."""
+        columns, shapes = self._shapes_at(positions, derivative)
+        return np.einsum("...ij,ij->...j", coordinates[..., columns], shapes)
+
+    def _shapes_at(self, positions: Array, derivative: int) -> tuple[NDArray[np.intp], Array]:
+        """Return the coordinates (count, positions) that act at each position, and their shapes there."""
         where = np.searchsorted(self.nodes, positions, side="right") - 1
         where = np.clip(where, 0, self.elements - 1)
         size = self.lengths[where]
         place = np.clip((positions - self.nodes[where]) / size, 0.0, 1.0)
         shapes = self.reference.unit_shapes(place, derivative) * self.scales[where].T / size**derivative
-        columns = self.reference.stride * where + np.arange(self.reference.count)[:, None]
-        return np.einsum("...ij,ij->...j", coordinates[..., columns], shapes)
+        return self.reference.stride * where + np.arange(self.reference.count)[:, None], shapes
 
 
 def uniform_mesh(length: float, elements: int, degree: int) -> LineMesh:

@@ -74,7 +74,7 @@ class Tissue(Part):
     """
 
     kind: Literal["foundation"] = "foundation"
-    rest_line: Literal["straight"] = "straight"
+    rest_line: Literal["straight", "cut-path"] = "straight"
     stiffness_factor: Annotated[TimeValue, TimeQuantity(at_least=0.0)] = 1.0
     layers: tuple[Layer, ...] = ()
 

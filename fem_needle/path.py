@@ -1,0 +1,72 @@
+"""The path that the tip has cut: the rest line of the tissue's springs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CutPath:
+    """Rest line r(y): zero over the initial depth, then where the tip was when it passed y for the first time.
+
+    Attributes
+    ----------
+    edges
+        y of the pieces' ends [m], rising from the initial depth to the deepest point; shape (pieces + 1,).
+    coefficients
+        Powers of (y - edge) of each piece, shape (pieces, 4).
+    front
+        Deflection of a tip that stands at the deepest point or beyond [m]: what r will be just in front of it.
+    """
+
+    edges: Array
+    coefficients: Array
+    front: float = 0.0
+
+    @property
+    def deepest(self) -> float:
+        """Deepest y that the tip has reached [m]."""
+        return float(self.edges[-1])
+
+    def value(self, y: Array) -> Array:
+        """Return r [m] at positions y [m]; at the deepest point and beyond, the front."""
+        if not len(self.coefficients):
+            return np.where(y >= self.deepest, self.front, 0.0)
+        piece = np.clip(np.searchsorted(self.edges, y, side="right") - 1, 0, len(self.coefficients) - 1)
+        offset = np.minimum(y, self.deepest) - self.edges[piece]
+        powers = self.coefficients[piece]
+        cut = ((powers[..., 3] * offset + powers[..., 2]) * offset + powers[..., 1]) * offset + powers[..., 0]
+        return np.where(y >= self.deepest, self.front, np.where(y >= self.edges[0], cut, 0.0))
+
+    def extended(self, positions: Sequence[float], deflections: Sequence[float]) -> CutPath:
+        """Return the path with one more piece: the polynomial through the given points, up to the last of them.
+
+        The first point is the tip at the present deepest position. Points that do not advance are left out.
+        """
+        start = positions[0]
+        kept = [(y - start, w) for y, w in zip(positions, deflections, strict=True)]
+        kept = [kept[0], *(now for before, now in zip(kept, kept[1:], strict=False) if now[0] > before[0])]
+        if len(kept) < 2:
+            return replace(self, front=deflections[-1])
+        offsets, values = np.array([y for y, _ in kept]), np.array([w for _, w in kept])
+        span = offsets[-1]
+        powers = np.linalg.solve(np.vander(offsets / span, len(kept), increasing=True), values)
+        piece = np.zeros(4)
+        piece[: len(kept)] = powers / span ** np.arange(len(kept))
+        edges, pieces = np.append(self.edges, start + span), np.vstack([self.coefficients, piece])
+        return CutPath(edges, pieces, deflections[-1])
+
+    def seen_from(self, depth: float, tip_deflection: float) -> CutPath:
+        """Return the path with the front of a tip that stands at a depth inside the last piece or beyond."""
+        return replace(self, front=tip_deflection) if depth >= self.deepest else self
+
+
+def straight_path(depth: float) -> CutPath:
+    """Return the path at the start: straight over the initial depth [m]."""
+    return CutPath(np.array([depth]), np.zeros((0, 4)))
