@@ -92,6 +92,10 @@ class FiniteElementNeedle:
             clamped=self.prescribed,
         )
 
+    def clamp_reactions(self, residual: Array, depth: float) -> tuple[float, float]:
+        """Return force [N] and moment [N m] of the clamp; a slope by depth fraction is z times the angle."""
+        return float(residual[0]), float(residual[1]) * self.frame.stretch(depth)
+
     def straight(self, deflection: float, angle: float) -> Array:
         """Return the coordinates of w = deflection + angle s (zero under ``entry``, whose clamp does not move)."""
         coordinates = deflection * self.deflection_at_one

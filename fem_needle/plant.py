@@ -155,6 +155,9 @@ class Plant(Protocol):
     def points(self, depth: float) -> Points:
         """Return where point forces act."""
 
+    def clamp_reactions(self, residual: Array, depth: float) -> tuple[float, float]:
+        """Return force [N] and moment [N m] of the clamp from what the coordinates' equations lack; zeros without a clamp."""
+
     def straight(self, deflection: float, angle: float) -> Array:
         """Return the coordinates of a straight needle, clamped with a deflection [m] and an angle [rad]."""
 

@@ -69,7 +69,7 @@ def sample_step(plant: Plant, step: Step, works: Works, deepest: float, depth: f
     axial_force = configuration_force(plant, stage, solution, inertia=inertia)
     if inertia:
         axial_force -= _rate(step, _axial_momenta(step), at_start=at_start)
-    clamp, tissue = _reactions(plant, step, end, at_start=at_start, inertia=inertia)
+    (hub_force, hub_moment), tissue = _reactions(plant, step, end, at_start=at_start, inertia=inertia)
     return Sample(
         time=stage.instant.time,
         depth=depth,
@@ -80,8 +80,8 @@ def sample_step(plant: Plant, step: Step, works: Works, deepest: float, depth: f
         push_force=mass * acceleration + friction + cutting - axial_force,
         friction_force=friction,
         tissue_force=tissue,
-        hub_force=float(clamp[0]),
-        hub_moment=float(clamp[1]),
+        hub_force=hub_force,
+        hub_moment=hub_moment,
         kinetic_energy=energy.kinetic,
         bending_energy=energy.bending,
         tissue_energy=energy.tissue,
@@ -97,9 +97,11 @@ def sample_step(plant: Plant, step: Step, works: Works, deepest: float, depth: f
     )
 
 
-def _reactions(plant: Plant, step: Step, end: StepEnd, *, at_start: bool, inertia: bool) -> tuple[Array, float]:
+def _reactions(
+    plant: Plant, step: Step, end: StepEnd, *, at_start: bool, inertia: bool
+) -> tuple[tuple[float, float], float]:
     """Return what the clamp exerts on the needle, (force, moment), and the tissue's total lateral force."""
-    stage, solution, clamped = end.stage, end.solution, plant.prescribed
+    stage, solution = end.stage, end.solution
     velocities = solution.velocities
     if not inertia:
         velocities = _rate_of_coordinates(step, at_start=at_start)
@@ -112,10 +114,9 @@ def _reactions(plant: Plant, step: Step, end: StepEnd, *, at_start: bool, inerti
         tissue = tissue + banded.multiply(stage.operators.damping, velocities)
         if stage.operators.drag is not None and stage.instant.speed:
             tissue = tissue + stage.instant.speed * banded.multiply(stage.operators.drag, solution.coordinates)
-    clamp = np.zeros(2)
-    clamp[:clamped] = needed[:clamped]
     if stage.rest is not None:
         tissue = tissue - stage.factor * stage.rest.load
+    clamp = plant.clamp_reactions(np.asarray(needed), stage.instant.depth)
     return clamp, -float(plant.deflection_at_one @ tissue)
 
 

@@ -141,8 +141,7 @@ def equilibrium(
 ) -> Equilibrium:
     """Collect a static state and the reactions that follow from it."""
     residual = banded.multiply(operators.stiffness, coordinates) - points.rows.T @ forces
-    clamp = np.zeros(2)
-    clamp[: plant.prescribed] = residual[: plant.prescribed]
+    hub_force, hub_moment = plant.clamp_reactions(residual, depth)
     tissue = -plant.deflection_at_one @ banded.multiply(operators.tissue, coordinates)
     return Equilibrium(
         plant,
@@ -151,8 +150,8 @@ def equilibrium(
         coordinates,
         forces,
         forces[: points.guides],
-        float(clamp[0]),
-        float(clamp[1]),
+        hub_force,
+        hub_moment,
         float(tissue),
     )
 

@@ -1,6 +1,1 @@
-"""Tests; the environment below must be set before numpy is loaded for the first time."""
-
-import os
-
-# Small matrices: threads only wait for each other, up to thirty times slower on a busy machine.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""Tests: `unit` mirrors the package, `consistency` compares with exact cases and references, `house` tests the house itself."""

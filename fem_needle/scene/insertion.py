@@ -14,34 +14,42 @@ from fem_needle.scene.time_functions import Sinusoid, Table, as_function
 from fem_needle.scene.time_quantity import TimeQuantity, TimeValue
 
 # Which keys each kind of insertion needs, and which it takes as well.
-_REQUIRED = {"hold": ("initial_depth",), "speed": ("initial_depth", "speed"), "profile": ("depth",)}
-_ALLOWED = {"hold": (), "speed": ("final_depth",), "profile": ("initial_depth",)}
-_KEYS = ("initial_depth", "speed", "final_depth", "depth")
+_REQUIRED = {
+    "hold": ("initial_depth",),
+    "speed": ("initial_depth", "speed"),
+    "profile": ("depth",),
+    "force": ("initial_depth", "push_force"),
+}
+_ALLOWED = {"hold": (), "speed": ("final_depth",), "profile": ("initial_depth",), "force": ("final_depth",)}
+_KEYS = ("initial_depth", "speed", "final_depth", "depth", "push_force")
 
 
 class Insertion(Part):
-    """Depth z(t), prescribed.
+    """How the needle goes in: z(t) prescribed, or a push.
 
     Parameters
     ----------
     kind
         ``"hold"``: stays at the initial depth; ``"speed"``: z is the integral of
-        the speed; ``"profile"``: z is given.
+        the speed; ``"profile"``: z is given; ``"force"``: z follows from a push.
     initial_depth
         z(0) [m]; a profile has its own.
     speed
         [m/s], positive going in; a plain number needs a final depth.
     final_depth
-        z where the needle rests [m]; only with a plain speed.
+        z where the needle rests [m], with a plain speed; where the run ends, with a push.
     depth
         z(t) [m] of a profile.
+    push_force
+        Axial force on the hub [N], positive when it pushes the needle in.
     """
 
-    kind: Literal["hold", "speed", "profile"]
+    kind: Literal["hold", "speed", "profile", "force"]
     initial_depth: Annotated[float | None, Quantity("m", at_least=0.0, optional=True)] = None
     speed: Annotated[TimeValue | None, TimeQuantity("m/s", optional=True)] = None
     final_depth: Annotated[float | None, Quantity("m", at_least=0.0, optional=True)] = None
     depth: Annotated[TimeValue | None, TimeQuantity("m", optional=True)] = None
+    push_force: Annotated[TimeValue | None, TimeQuantity("N", optional=True)] = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:

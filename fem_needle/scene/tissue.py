@@ -32,6 +32,8 @@ class Layer(Part):
         c [N s/m^2], lateral force per length and speed.
     cutting_force
         Axial force [N] while the tip advances in the layer.
+    puncture_force
+        Axial force [N] that the tip must exceed once to enter the layer (force-driven).
     """
 
     name: StrictStr = ""
@@ -40,6 +42,7 @@ class Layer(Part):
     foundation_modulus: Annotated[float, Quantity("N/m^2", at_least=0.0, at_most=1e12)]
     damping: Annotated[float, Quantity("N s/m^2", at_least=0.0)] = 0.0
     cutting_force: Annotated[float, Quantity("N", at_least=0.0)] = 0.0
+    puncture_force: Annotated[float, Quantity("N", at_least=0.0)] = 0.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -1,0 +1,121 @@
+"""The documents are true: their commands and examples run, their links lead somewhere, the contract names everything."""
+
+import re
+import shlex
+import subprocess
+import sys
+from itertools import chain
+
+import pytest
+import typer
+
+import fem_needle
+from fem_needle.cli import build_application
+from fem_needle.scene import Scene
+from fem_needle.series_file import COORDINATES, FIELDS
+from fem_needle.shipped import shipped_names
+from fem_needle.trajectory import VARIABLES
+from tests.house.source import ROOT, texts
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+CONTRACT = (ROOT / "docs" / "contract.md").read_text(encoding="utf-8")
+SETUP = "python3 -m venv .venv && .venv/bin/pip install -q -e "
+RUN_COMMAND = SETUP + ". && .venv/bin/fem-needle run thesis"
+TEST_COMMAND = SETUP + "'.[dev]' && .venv/bin/pytest"
+MARKDOWN = [path for path in texts() if path.suffix == ".md"]
+
+
+def blocks(text, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def command_lines():
+    """Every `fem-needle ...` line of the README, without the set-up before it."""
+    lines = chain.from_iterable(block.splitlines() for block in blocks(README, "sh"))
+    found = (re.search(r"fem-needle (.*)$", line) for line in lines)
+    return [match.group(1).partition(" #")[0].strip() for match in found if match]
+
+
+def test_the_readme_has_the_two_commands():
+    lines = list(chain.from_iterable(block.splitlines() for block in blocks(README, "sh")))
+    assert RUN_COMMAND in lines
+    assert TEST_COMMAND in lines
+
+
+def test_the_build_script_begins_with_the_test_command():
+    lines = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    commands = [line for line in lines if line and not line.startswith(("#", "set ", "cd "))]
+    assert commands[0] == TEST_COMMAND
+
+
+@pytest.mark.parametrize("line", command_lines())
+def test_commands_of_the_readme_run(line, tmp_path):
+    command = [sys.executable, "-m", "fem_needle", *shlex.split(line)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    assert done.stdout
+
+
+def test_the_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
+    (example,) = blocks(README, "python")
+    assert len(example.splitlines()) <= 15
+    monkeypatch.chdir(tmp_path)
+    exec(compile(example, "README.md", "exec"), {})
+    assert "mm" in capsys.readouterr().out
+    assert (tmp_path / "my-run" / "series.nc").exists()
+
+
+def test_the_readme_lists_every_shipped_scene():
+    assert {name for name in shipped_names() if f"`{name}`" not in README} == set()
+
+
+@pytest.mark.parametrize("path", MARKDOWN, ids=lambda path: str(path.relative_to(ROOT)))
+def test_links_lead_somewhere(path):
+    targets = re.findall(r"\]\(([^)\s]+)\)", path.read_text(encoding="utf-8"))
+    local = [target.partition("#")[0] for target in targets if "://" not in target]
+    assert [target for target in local if target and not (path.parent / target).exists()] == []
+
+
+@pytest.mark.parametrize("path", MARKDOWN, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_that_documents_name_exist(path):
+    names = re.findall(r"`((?:tests|docs|fem_needle|benchmarks)/[\w./-]+)`", path.read_text(encoding="utf-8"))
+    assert [name for name in names if not (ROOT / name).exists()] == []
+
+
+def scene_keys():
+    schema = Scene.model_json_schema()
+    return set(chain.from_iterable(part.get("properties", {}) for part in (schema, *schema["$defs"].values())))
+
+
+def commands():
+    return typer.main.get_command(build_application()).commands
+
+
+def missing(names):
+    return {name for name in names if not re.search(rf"(?<![\w-]){re.escape(name)}(?![\w-])", CONTRACT)}
+
+
+def test_the_contract_names_every_key_of_a_scene():
+    assert "foundation_modulus" in scene_keys()
+    assert missing(scene_keys()) == set()
+
+
+def test_the_contract_names_every_variable_of_the_series():
+    assert missing({*VARIABLES, *COORDINATES, *FIELDS}) == set()
+
+
+def test_the_contract_names_every_command_and_option():
+    options = {name for command in commands().values() for item in command.params for name in item.opts if name.startswith("--")}
+    assert "--tolerance" in options
+    assert missing({*commands(), *options}) == set()
+
+
+def test_the_contract_names_everything_public():
+    assert "run_scene" in dir(fem_needle)
+    assert missing(dir(fem_needle)) == set()
+
+
+@pytest.mark.parametrize("name", sorted(commands()))
+def test_the_help_of_a_command_shows_an_example(name):
+    examples = re.findall(r"Example: fem-needle ([\w-]+)", commands()[name].help or "")
+    assert examples == [name]

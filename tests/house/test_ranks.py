@@ -1,0 +1,109 @@
+"""Rooms have ranks: a room imports only rooms of lower rank. The table is the map of the house."""
+
+import ast
+
+import pytest
+
+from tests.house.source import PACKAGES, module_name, python_files, tree
+
+RANKS = {
+    # no other room
+    "errors": 0,
+    "banded": 0,
+    "collocation": 0,
+    "frames": 0,
+    "shipped": 0,
+    "atomic_file": 0,
+    "vtk_file": 0,
+    # physics and reference elements
+    "scene": 1,
+    "elements": 1,
+    # what knows a scene and no model
+    "checks": 2,
+    "scene_file": 2,
+    "segments": 2,
+    "exact": 2,
+    "manifest": 2,
+    "tissue_block": 2,
+    "plant": 2,
+    # parts of a model, and what needs only the protocol
+    "axial": 3,
+    "foundation": 3,
+    "loads": 3,
+    "free_response": 3,
+    "run_target": 3,
+    "needle": 4,
+    "motion": 4,
+    "statics": 4,
+    # time: stages, ledger, steps, the loop; no mesh
+    "stages": 5,
+    "ledger": 6,
+    "initial": 7,
+    "steppers": 7,
+    "samples": 8,
+    "march": 9,
+    "skipping": 10,
+    "trajectory": 10,
+    "choices": 11,
+    "series_file": 11,
+    "vtk_export": 11,
+    # whole runs
+    "simulation": 12,
+    "run_folder": 12,
+    "cli": 13,
+    "__main__": 14,
+}
+# A convenience of the result that reaches upward, when it is called and not before.
+LATE = {("trajectory", "run_folder")}
+# The rooms that may know a mesh: everything else must work with any plant.
+KNOW_A_MESH = {"elements", "frames", "foundation", "needle", "choices", "simulation"}
+MESH = {"elements", "frames", "foundation", "needle"}
+
+
+def room(module):
+    parts = module.split(".")
+    return parts[1] if len(parts) > 1 else ""
+
+
+def imported_modules(path):
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            module = node.module or ""
+            yield from (f"{module}.{alias.name}" for alias in node.names) if module in PACKAGES else (module,)
+
+
+def imports(package):
+    """Yield importing module and imported module, of this project, for each import across rooms."""
+    for path in python_files(package):
+        for name in imported_modules(path):
+            here = module_name(path)
+            if name.split(".")[0] in PACKAGES and (name.split(".")[0] != package or room(name) != room(here)):
+                yield here, name
+
+
+def test_every_room_has_a_rank_and_every_rank_a_room():
+    assert {room(module_name(path)) for path in python_files("fem_needle")} - {""} == set(RANKS)
+
+
+def test_a_room_imports_only_rooms_of_lower_rank():
+    found = {(room(here), room(name)) for here, name in imports("fem_needle")}
+    assert ("march", "steppers") in found  # the search finds imports at all
+    assert {pair for pair in found - LATE if RANKS[pair[0]] <= RANKS.get(pair[1], -1)} == set()
+
+
+def test_the_models_know_no_study_and_the_studies_no_mesh():
+    found = {(room(here), room(name)) for here, name in imports("fem_needle") if room(name) in MESH}
+    assert {here for here, _ in found} <= KNOW_A_MESH
+
+
+def test_the_reference_does_not_know_the_reduced_model():
+    assert [pair for pair in imports("fem_needle") if pair[1].startswith("reduced_model")] == []
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_packages_do_not_import_tests(package):
+    names = [name for path in python_files(package) for name in imported_modules(path)]
+    assert not [name for name in names if name.split(".")[0] == "tests"]
