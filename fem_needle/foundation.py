@@ -35,11 +35,14 @@ class Foundation:
         The tissue's layers.
     mesh, frame
         The mesh and where y lies on it.
+    tip_stiffness
+        Spring that travels with the tip [N/m].
     """
 
     layers: tuple[Layer, ...]
     mesh: LineMesh
     frame: Frame
+    tip_stiffness: float = 0.0
     _mass: IntervalIntegrals = field(init=False)
     _drag: IntervalIntegrals = field(init=False)
     _slip: IntervalIntegrals = field(init=False)
@@ -62,7 +65,9 @@ class Foundation:
     def stiffness(self, depth: float) -> Array:
         """Return G(z) = sum k_i F_i(z)."""
         moduli = tuple(layer.foundation_modulus for layer in self.layers)
-        return self._sum(self._mass, moduli, depth, self.frame.stretch(depth))
+        band = self._sum(self._mass, moduli, depth, self.frame.stretch(depth))
+        band[self.mesh.half_bandwidth, -2] += self.tip_stiffness
+        return band
 
     def stiffness_rate_product(self, coordinates: Array, depth: float) -> Array:
         """Return dG/dz q: what the moving ends of the segments add, and the stretch."""
@@ -72,6 +77,8 @@ class Foundation:
             result += (frame.stretch_rate / frame.stretch(depth)) * banded.multiply(
                 self.stiffness(depth), coordinates
             )
+            # The tip spring does not stretch.
+            result[-2] -= frame.stretch_rate / frame.stretch(depth) * self.tip_stiffness * coordinates[-2]
         for segment in inserted_segments(self.layers, depth):
             modulus = self.layers[segment.layer].foundation_modulus * frame.stretch(depth)
             for y, sign in ((segment.end, 1.0), (segment.start, -1.0)):

@@ -21,7 +21,8 @@ class LoadCase:
     Attributes
     ----------
     forces, force_rates
-        Lateral loads in the scene's order, the sum of all tip loads last [N], [N/s].
+        Lateral loads in the scene's order, then the torque of a hub that turns with the needle [N m], the sum of all tip
+        loads last [N], [N/s].
     clamp, clamp_rates, clamp_accelerations
         Deflection [m] and angle [rad] of the hub, and their first two rates; zero under ``entry``.
     """
@@ -40,19 +41,26 @@ def second_derivative(function: TimeFunction, time: float) -> float:
     return -((2 * pi * function.frequency) ** 2) * (function.value(time) - function.mean)
 
 
+def turns_with_needle(scene: Scene) -> bool:
+    """Return whether the hub's rotation is a coordinate of the needle."""
+    return scene.support.kind == "hub" and scene.support.hub_rotation == "free"
+
+
 def is_steady(scene: Scene) -> bool:
     """Return whether forces and hub stay the same at a fixed depth."""
     support = scene.support
-    values = [support.hub_deflection, support.hub_angle, scene.tissue.stiffness_factor]
+    values = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
     values += [load.force for load in scene.loads if load.force is not None]
     return all(isinstance(value, float) for value in values)
 
 
 def load_case(scene: Scene, depth: float, time: float) -> LoadCase:
     """Return the loads at a depth [m] (the bevel law asks for the layer at the tip) and time [s]."""
-    lateral = [as_function(load.force) for load in scene.loads if isinstance(load, LateralLoad)]
-    forces = [function.value(time) for function in lateral]
-    rates = [function.derivative(time) for function in lateral]
+    known = [as_function(load.force) for load in scene.loads if isinstance(load, LateralLoad)]
+    if turns_with_needle(scene):
+        known.append(as_function(scene.support.hub_torque))
+    forces = [function.value(time) for function in known]
+    rates = [function.derivative(time) for function in known]
     tip, tip_rate = _tip_force(scene, depth, time)
     clamp = [as_function(scene.support.hub_deflection), as_function(scene.support.hub_angle)]
     return LoadCase(

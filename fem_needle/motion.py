@@ -134,7 +134,8 @@ def run_duration(scene: Scene) -> float:
 
 def landing_times(scene: Scene, law: DepthLaw, duration: float, smallest_depth: float) -> tuple[float, ...]:
     """Return every time in (0, duration) on which a step must land: kinks of motion, loads and layers."""
-    sources = [scene.support.hub_deflection, scene.support.hub_angle, scene.tissue.stiffness_factor]
+    support = scene.support
+    sources = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
     sources += [load.force for load in scene.loads if isinstance(load, LateralLoad)]
     sources += [load.force for load in scene.loads if isinstance(load, TipLoad) and load.force is not None]
     times = set(law.kinks(duration))

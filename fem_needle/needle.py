@@ -21,6 +21,7 @@ from fem_needle.foundation import Foundation
 from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
 from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Points, RestTerms
+from fem_needle.loads import turns_with_needle
 from fem_needle.scene import Guide, LateralLoad, Scene, as_function
 
 Array = NDArray[np.float64]
@@ -63,9 +64,10 @@ class FiniteElementNeedle:
         length = scene.needle.length
         self.mesh = uniform_mesh(1.0 if self.is_entry else length, elements, degree)
         self.frame: Frame = StretchedFrame() if self.is_entry else MaterialFrame(length)
-        self.foundation = Foundation(scene.tissue.layers, self.mesh, self.frame)
+        self.foundation = Foundation(scene.tissue.layers, self.mesh, self.frame, scene.tissue.tip_stiffness or 0.0)
         self.size = self.mesh.size
-        self.prescribed = 2
+        self.turns = turns_with_needle(scene)
+        self.prescribed = 1 if self.turns else 2
         self.smallest_depth = SMALLEST_DEPTH_FRACTION * length if self.is_entry else 0.0
         self.deflection_at_one = np.zeros(self.size)
         self.deflection_at_one[:: self.mesh.reference.stride] = 1.0
@@ -128,7 +130,7 @@ class FiniteElementNeedle:
     def points(self, depth: float) -> Points:
         """Return rows and flexibilities of guides, lateral loads and tip."""
         positions = [point.position for point in self._point_list]
-        count = len(positions) + 1
+        count = len(positions) + self.turns + 1
         rows, rates = np.zeros((count, self.size)), np.zeros((count, self.size))
         flexibility, flexibility_rate = np.zeros((count, count)), np.zeros((count, count))
         places = [self.mesh.locate(self.frame.position(y, depth)) for y in positions]
@@ -137,6 +139,8 @@ class FiniteElementNeedle:
             rows[index] = self.mesh.row(s)
             rates[index] = self.frame.position_rate(y, depth) * self.mesh.row(s, 1)
         rows[-1, -2] = 1.0
+        if self.turns:
+            rows[-2, 1] = 1.0
         for first, (element, place) in enumerate(places):
             for second, (other, other_place) in enumerate(places):
                 if element == other:
@@ -197,6 +201,8 @@ def _beam_operators(mesh: LineMesh, scene: Scene) -> _Beam:
     mass = interval_integrals(mesh, "mass").band * needle.mass_per_length
     bending = interval_integrals(mesh, "bending").band * needle.bending_stiffness
     if scene.support.kind == "hub":
+        if turns_with_needle(scene):
+            mass[banded.half_bandwidth(mass), 1] += scene.support.hub_rotational_inertia or 0.0
         return _Beam(mass, bending, None, None)
     # chi = -xi psi' (fixed-frame) or (1 - xi) psi' (material): -x psi' with x counted from the surface or from the tip
     origin = 0.0 if scene.model.kinematics == "fixed-frame" else 1.0

@@ -46,8 +46,9 @@ def inertia_free_stepper(plant: Plant) -> Stepper:
 def shortest_period(scene: Scene) -> float:
     """Return the shortest period [s] of any sinusoid of the scene, infinity without one."""
     insertion = scene.insertion
-    sources = [scene.support.hub_deflection, scene.support.hub_angle, scene.tissue.stiffness_factor]
-    sources += [value for value in (insertion.speed, insertion.depth) if value is not None]
+    support = scene.support
+    sources = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
+    sources += [value for value in (insertion.speed, insertion.depth, insertion.push_force) if value is not None]
     sources += [load.force for load in scene.loads if load.force is not None]
     rates = [abs(source.frequency) for source in sources if isinstance(source, Sinusoid)]
     return 1.0 / max(rates) if rates and max(rates) > 0 else float("inf")

@@ -81,7 +81,7 @@ def solve_static(plant: Plant, *, depth: float, time: float = 0.0) -> Equilibriu
         return _straight(plant, depth, time, case)
     operators, points = plant.operators(depth, time), plant.points(depth)
     coordinates, forces = static_state(plant, operators, points, case, depth=depth, time=time)
-    return check_force_sum(equilibrium(plant, depth, time, operators, points, coordinates, forces))
+    return check_force_sum(equilibrium(plant, depth, time, operators, points, coordinates, forces), points)
 
 
 def static_state(
@@ -156,7 +156,7 @@ def equilibrium(
     )
 
 
-def check_force_sum(rest: Equilibrium) -> Equilibrium:
+def check_force_sum(rest: Equilibrium, points: Points) -> Equilibrium:
     """Return the state if support, guides, loads and tissue balance.
 
     Raises
@@ -166,7 +166,9 @@ def check_force_sum(rest: Equilibrium) -> Equilibrium:
     """
     if not rest.plant.prescribed:
         return rest  # without a clamp in the coordinates there is no support force to add up
-    forces = [rest.hub_force, rest.tissue_force, *rest.point_forces]
+    # A force's row gives 1 for the function 1, a torque's gives 0.
+    lateral = rest.point_forces * (points.rows @ rest.plant.deflection_at_one)
+    forces = [rest.hub_force, rest.tissue_force, *lateral]
     largest = max(abs(force) for force in forces)
     if abs(sum(forces)) > FORCE_SUM_TOLERANCE * largest:
         raise ComputationError(

@@ -18,11 +18,13 @@ ROUNDING = 1e-12
 
 def cross_mistakes(scene: Scene) -> Iterator[Mistake]:
     """Yield all mistakes between parts that are each correct."""
-    if scene.insertion.end_time is None and scene.run.duration is None:
+    ends_at_depth = scene.insertion.kind == "force" and scene.insertion.final_depth is not None
+    if scene.insertion.end_time is None and scene.run.duration is None and not ends_at_depth:
         message = "is required, because this insertion does not end by itself (allowed above 0 s)"
         yield Mistake("run.duration", message)
         return
     yield from _depth_mistakes(scene)
+    yield from _push_mistakes(scene)
     if scene.support.kind == "hub":
         yield from _place_mistakes(scene)
         yield from _kinematics_mistakes(scene)
@@ -41,11 +43,23 @@ def _depth_mistakes(scene: Scene) -> Iterator[Mistake]:
             message = f"deeper than the needle is long (got {depth:g}; {allowed})"
             yield Mistake(f"insertion.{key}", message, depth)
             slack = float("inf")  # the same mistake, not to be told twice
+    if insertion.kind == "force" and insertion.final_depth is not None and insertion.final_depth <= insertion.first_depth:
+        limits = f"got {insertion.final_depth:g}; allowed above initial_depth = {insertion.first_depth:g} m"
+        yield Mistake("insertion.final_depth", f"a push ends deeper than it began ({limits})", insertion.final_depth)
     key = {"speed": "speed", "profile": "depth"}.get(insertion.kind, "initial_depth")
     for extreme in (lowest, highest):
         if not -slack <= extreme <= length + slack:
             message = f"the depth leaves the needle in the run (reaches {extreme:.9g}; {allowed})"
             yield Mistake(f"insertion.{key}", message, extreme)
+
+
+def _push_mistakes(scene: Scene) -> Iterator[Mistake]:
+    if scene.insertion.kind == "force" and scene.numerics.analysis == "static":
+        message = "a push needs motion (got 'static'; allowed 'dynamic', 'quasi-static', 'auto')"
+        yield Mistake("numerics.analysis", message, "static")
+    if scene.tissue.rest_line == "cut-path" and scene.numerics.analysis == "static":
+        message = "a cut path needs history (got 'static'; allowed 'quasi-static', 'dynamic', 'auto')"
+        yield Mistake("numerics.analysis", message, "static")
 
 
 def _places(scene: Scene) -> Iterator[tuple[str, str, float]]:

@@ -39,6 +39,13 @@ class Support(Part):
         Lateral position of the hub [m], may vary in time; hub only.
     hub_angle
         Angle of the hub [rad], may vary in time; hub only.
+    hub_rotation
+        ``"fixed"``: the hub has the angle given; ``"free"``: it turns under its torque
+        and the needle's moment (under ``entry``, decoupled, under its torque alone).
+    hub_torque
+        On a free hub [N m], may vary in time; positive turns the needle to positive deflections.
+    hub_rotational_inertia
+        Of a free hub [kg m^2].
     guides
         Hub only.
     """
@@ -46,6 +53,9 @@ class Support(Part):
     kind: Literal["hub", "entry"]
     hub_deflection: Annotated[TimeValue, TimeQuantity("m")] = 0.0
     hub_angle: Annotated[TimeValue, TimeQuantity("rad")] = 0.0
+    hub_rotation: Literal["fixed", "free"] = "fixed"
+    hub_torque: Annotated[TimeValue, TimeQuantity("N m")] = 0.0
+    hub_rotational_inertia: Annotated[float | None, Quantity("kg m^2", above=0.0, optional=True)] = None
     guides: tuple[Guide, ...] = ()
 
     @model_validator(mode="after")
@@ -59,6 +69,7 @@ class Support(Part):
             if position in positions[:index]:
                 message = f"two guides at one place (got {position:g}; allowed different places)"
                 yield Mistake(f"guides.{index}.position", message, position)
+        yield from self._rotation_mistakes()
         if self.kind == "entry":
             for name, moved in (("hub_deflection", self.hub_deflection), ("hub_angle", self.hub_angle)):
                 if moved != 0.0:
@@ -66,3 +77,16 @@ class Support(Part):
             if self.guides:
                 message = "has no meaning under 'entry', where nothing outside bends (allowed none)"
                 yield Mistake("guides", message)
+
+    def _rotation_mistakes(self) -> Iterator[Mistake]:
+        if self.hub_rotation == "free":
+            if self.hub_rotational_inertia is None:
+                yield Mistake("hub_rotational_inertia", "is required by a free hub (allowed above 0 kg m^2)")
+            if self.hub_angle != 0.0:
+                yield Mistake("hub_angle", "a free hub has no prescribed angle (allowed 0, or hub_rotation = 'fixed')")
+            return
+        if self.hub_torque != 0.0:
+            yield Mistake("hub_torque", "has no meaning on a fixed hub (allowed 0, or hub_rotation = 'free')")
+        if self.hub_rotational_inertia is not None:
+            message = "has no meaning on a fixed hub (allowed none, or hub_rotation = 'free')"
+            yield Mistake("hub_rotational_inertia", message)

@@ -67,16 +67,21 @@ class Tissue(Part):
     Parameters
     ----------
     kind
-        ``"foundation"``: springs and dampers along the needle.
+        ``"foundation"``: springs and dampers along the needle; ``"tip-spring"``: one
+        spring that travels with the tip.
+    tip_stiffness
+        Of the tip spring [N/m].
     rest_line
-        ``"straight"``: the springs are at rest on the undeflected axis.
+        ``"straight"``: the springs are at rest on the undeflected axis;
+        ``"cut-path"``: on the path that the tip has cut.
     stiffness_factor
         m(t), multiplies every foundation modulus (swelling).
     layers
         Not overlapping; names, where given, differ.
     """
 
-    kind: Literal["foundation"] = "foundation"
+    kind: Literal["foundation", "tip-spring"] = "foundation"
+    tip_stiffness: Annotated[float | None, Quantity("N/m", at_least=0.0, optional=True)] = None
     rest_line: Literal["straight", "cut-path"] = "straight"
     stiffness_factor: Annotated[TimeValue, TimeQuantity(at_least=0.0)] = 1.0
     layers: tuple[Layer, ...] = ()
@@ -87,6 +92,7 @@ class Tissue(Part):
         return self
 
     def _mistakes(self) -> Iterator[Mistake]:
+        yield from self._kind_mistakes()
         for (first, one), (second, other) in combinations(enumerate(self.layers), 2):
             if one.name and one.name == other.name:
                 message = f"names must differ (got {other.name!r} twice; allowed once)"
@@ -96,3 +102,17 @@ class Tissue(Part):
                 index = second if upper is other else first
                 message = f"layers overlap (got {upper.start:g}; allowed at least {lower.far_side:g} m)"
                 yield Mistake(f"layers.{index}.start", message, upper.start)
+
+    def _kind_mistakes(self) -> Iterator[Mistake]:
+        if self.kind == "foundation":
+            if self.tip_stiffness is not None:
+                message = f"has no meaning with kind 'foundation' (got {self.tip_stiffness:g}; allowed with 'tip-spring')"
+                yield Mistake("tip_stiffness", message, self.tip_stiffness)
+            return
+        if self.tip_stiffness is None:
+            yield Mistake("tip_stiffness", "is required by kind 'tip-spring' (allowed at least 0 N/m)")
+        if self.layers:
+            yield Mistake("layers", "have no meaning with kind 'tip-spring', whose one spring is at the tip (allowed none)")
+        if self.rest_line != "straight":
+            message = "a tip spring leaves no path behind (got 'cut-path'; allowed 'straight')"
+            yield Mistake("rest_line", message, self.rest_line)
