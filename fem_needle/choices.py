@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
-from fem_needle.motion import depth_law, run_duration
+from fem_needle.motion import PUSH_SLACK, depth_law, run_duration
 from fem_needle.needle import FiniteElementNeedle
 from fem_needle.plant import Plant
+from fem_needle.pushed_march import run_limits
 from fem_needle.scene import Scene
 from fem_needle.skipping import (
     INERTIA_SHARE,
@@ -63,10 +64,13 @@ def choose(scene: Scene, plant_with: Callable[[int], Plant]) -> Choice:
     """Return analysis, output step and what is skipped; ``plant_with`` makes a plant with a number of elements."""
     numerics = scene.numerics
     duration = run_duration(scene)
-    step = numerics.output_step if isinstance(numerics.output_step, float) else duration / OUTPUTS
+    slack = PUSH_SLACK if scene.run.duration is None and scene.insertion.kind == "force" else 1.0
+    step = numerics.output_step if isinstance(numerics.output_step, float) else duration / slack / OUTPUTS
     if step > duration:
         raise SceneError(f"numerics.output_step: longer than the run (got {step:g}; allowed up to {duration:g} s)")
     analysis, skipped, effect = numerics.analysis, tuple(unneeded_terms(scene)), 0.0
+    if analysis == "auto" and scene.insertion.kind == "force":
+        analysis = "dynamic"
     if analysis == "auto":
         effect = inertia_effect(plant_with(PILOT_ELEMENTS))
         allowed = INERTIA_SHARE * numerics.tolerance
@@ -121,5 +125,9 @@ def _instants(plant: Plant) -> list[tuple[float, float]]:
     scene, law = plant.scene, depth_law(plant.scene)
     times = np.linspace(0.0, run_duration(scene), PILOT_INSTANTS).tolist()
     found = [(time, law.depth(time)) for time in times]
+    if scene.insertion.kind == "force":  # the depths over time are not known yet: spread them
+        last = scene.insertion.final_depth or run_limits(scene).contact
+        depths = np.linspace(scene.insertion.first_depth, last, PILOT_INSTANTS + 1)[:-1].tolist()
+        found = list(zip(times, depths, strict=True))
     shallow = SHALLOW * scene.needle.length if scene.support.kind == "entry" else 0.0
     return [(time, max(depth, shallow)) for time, depth in found]

@@ -32,6 +32,8 @@ class Works:
     boundary_energy: float = 0.0
     friction_dissipation: float = 0.0
     cutting_work: float = 0.0
+    push_work: float = 0.0
+    arrest_loss: float = 0.0
 
     def __add__(self, other: Works) -> Works:
         """Add term by term."""

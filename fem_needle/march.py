@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
@@ -76,8 +76,16 @@ def _snapped(time: float, landings: tuple[float, ...], distance: float) -> float
     return next((landing for landing in landings if abs(landing - time) <= distance), time)
 
 
-def march(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Iterator[Sample]:
-    """Yield a sample at each output time.
+@dataclass(frozen=True)
+class RunEnd:
+    """Why a run ended, and after how many steps."""
+
+    reason: str
+    steps: int
+
+
+def march(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample, None, RunEnd]:
+    """Yield a sample at each output time; the generator's value says how the run ended.
 
     Raises
     ------
@@ -102,6 +110,8 @@ def march(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Iterator[Sample]:
             state, last, deepest = step.ends[1], step, max(deepest, law.depth(until))
         if end in outputs:
             yield sample_step(plant, step, works, deepest, law.depth(end), at_start=False, inertia=stepper.inertia)
+    ends_by_itself = plant.scene.run.duration is None and plant.scene.insertion.final_depth is not None
+    return RunEnd("final-depth" if ends_by_itself else "duration", grid.steps)
 
 
 def _pass_landing(

@@ -6,12 +6,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, nextafter
+from typing import Protocol
 
 from scipy.optimize import brentq
 
 from fem_needle.loads import second_derivative
+from fem_needle.rigid_push import time_to_depth
 from fem_needle.scene import LateralLoad, Scene, Sinusoid, Table, TimeFunction, TipLoad, as_function
 from fem_needle.segments import interfaces
+
+PUSH_SLACK = 5.0
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,19 @@ class Instant:
     depth: float
     speed: float
     acceleration: float
+
+
+class Motion(Protocol):
+    """What a stepper asks of the insertion over one step."""
+
+    def depth(self, time: float) -> float:
+        """Return z(t) [m]."""
+
+    def after(self, time: float) -> Instant:
+        """Return the motion just after a time."""
+
+    def before(self, time: float) -> Instant:
+        """Return the motion just before a time."""
 
 
 @dataclass(frozen=True)
@@ -53,14 +70,14 @@ class DepthLaw:
         insertion = self.scene.insertion
         if insertion.kind == "profile":
             return float(self._source.derivative(time))
-        if insertion.kind == "hold" or time >= self.rests_from:
+        if insertion.kind in {"hold", "force"} or time >= self.rests_from:
             return 0.0
         return float(self._source.value(time))
 
     def acceleration(self, time: float) -> float:
         """Return the second derivative of z from the right, without the jumps of speed [m/s^2]."""
         insertion = self.scene.insertion
-        if insertion.kind == "hold" or time >= self.rests_from:
+        if insertion.kind in {"hold", "force"} or time >= self.rests_from:
             return 0.0
         if insertion.kind == "speed":
             return float(self._source.derivative(time))
@@ -110,7 +127,7 @@ class DepthLaw:
 
     def _unstopped(self, time: float) -> float:
         insertion = self.scene.insertion
-        if insertion.kind == "hold":
+        if insertion.kind in {"hold", "force"}:
             return insertion.first_depth
         return insertion.first_depth + float(self._source.integral(time))
 
@@ -127,15 +144,22 @@ def depth_law(scene: Scene) -> DepthLaw:
 
 
 def run_duration(scene: Scene) -> float:
-    """Return how long the run lasts [s]: as the scene says, else until the insertion ends."""
-    duration = scene.run.duration
-    return float(scene.insertion.end_time or 0.0) if duration is None else duration
+    """Return how long the run lasts [s]: as the scene says, else until the insertion ends.
+
+    A push to a final depth gets several times what a rigid needle would take: it ends by itself.
+    """
+    if scene.run.duration is not None:
+        return scene.run.duration
+    if scene.insertion.kind == "force":
+        return PUSH_SLACK * time_to_depth(scene)
+    return float(scene.insertion.end_time or 0.0)
 
 
 def landing_times(scene: Scene, law: DepthLaw, duration: float, smallest_depth: float) -> tuple[float, ...]:
     """Return every time in (0, duration) on which a step must land: kinks of motion, loads and layers."""
     support = scene.support
     sources = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
+    sources += [] if scene.insertion.push_force is None else [scene.insertion.push_force]
     sources += [load.force for load in scene.loads if isinstance(load, LateralLoad)]
     sources += [load.force for load in scene.loads if isinstance(load, TipLoad) and load.force is not None]
     times = set(law.kinks(duration))

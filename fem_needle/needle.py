@@ -19,9 +19,9 @@ from fem_needle.elements.mesh import LineMesh, uniform_mesh
 from fem_needle.errors import SceneError
 from fem_needle.foundation import Foundation
 from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
+from fem_needle.loads import turns_with_needle
 from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Points, RestTerms
-from fem_needle.loads import turns_with_needle
 from fem_needle.scene import Guide, LateralLoad, Scene, as_function
 
 Array = NDArray[np.float64]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +52,7 @@ class CutPath:
         """
         start = positions[0]
         kept = [(y - start, w) for y, w in zip(positions, deflections, strict=True)]
-        kept = [kept[0], *(now for before, now in zip(kept, kept[1:], strict=False) if now[0] > before[0])]
+        kept = [kept[0], *(now for before, now in pairwise(kept) if now[0] > before[0])]
         if len(kept) < 2:
             return replace(self, front=deflections[-1])
         offsets, values = np.array([y for y, _ in kept]), np.array([w for _, w in kept])

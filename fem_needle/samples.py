@@ -46,6 +46,8 @@ class Sample:
     boundary_energy: float
     friction_dissipation: float
     cutting_work: float
+    push_work: float
+    arrest_loss: float
     axial_kinetic_energy: float
 
     @property
@@ -93,6 +95,8 @@ def sample_step(plant: Plant, step: Step, works: Works, deepest: float, depth: f
         boundary_energy=works.boundary_energy,
         friction_dissipation=works.friction_dissipation,
         cutting_work=works.cutting_work,
+        push_work=works.push_work,
+        arrest_loss=works.arrest_loss,
         axial_kinetic_energy=0.5 * mass * speed**2,
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Generator
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, Protocol
 
@@ -11,9 +12,10 @@ import numpy as np
 from fem_needle.choices import Choice, choose, choose_elements, first_time_step, mesh_error
 from fem_needle.collocation import collocation
 from fem_needle.errors import ComputationError
-from fem_needle.march import TimeGrid, march, time_grid
+from fem_needle.march import RunEnd, TimeGrid, march, time_grid
 from fem_needle.needle import FiniteElementNeedle
 from fem_needle.plant import Plant
+from fem_needle.pushed_march import march_pushed
 from fem_needle.samples import Sample
 from fem_needle.scene import Scene
 from fem_needle.skipping import inertia_free_stepper
@@ -167,8 +169,8 @@ def _run_live(job: _Job, time_step: float, time_error: float | None) -> Trajecto
     grid = time_grid(job.plant, time_step, job.choice.output_step)
     _begin(job, grid)
     samples: list[Sample] = []
-    stop = _collect(job, grid, samples, live=True)
-    return _trajectory(job, grid, samples, time_error, stop)
+    end = _collect(job, grid, samples, live=True)
+    return _trajectory(job, grid, samples, time_error, end)
 
 
 def _run_refined(job: _Job, time_step: float) -> Trajectory:
@@ -178,9 +180,9 @@ def _run_refined(job: _Job, time_step: float) -> Trajectory:
     coarser: Trajectory | None = None
     for _ in range(MOST_HALVINGS + 1):
         samples: list[Sample] = []
-        stop = _collect(job, grid, samples, live=False)
-        run = _trajectory(job, grid, samples, None, stop)
-        if stop == "interrupted":
+        end = _collect(job, grid, samples, live=False)
+        run = _trajectory(job, grid, samples, None, end)
+        if end.reason == "interrupted":
             break
         if coarser is not None:
             error = _difference(coarser, run)
@@ -215,21 +217,33 @@ def _is_accurate(job: _Job, error: float, run: Trajectory) -> bool:
 def _difference(coarser: Trajectory, finer: Trajectory) -> float:
     """Return the largest tip difference of two runs relative to the largest tip: a bound on the finer one's error."""
     scale = max(float(np.max(np.abs(finer.tip_deflection))), finer.scene.numerics.absolute_tolerance)
-    return float(np.max(np.abs(coarser.tip_deflection - finer.tip_deflection))) / scale
+    common = min(len(coarser.time), len(finer.time)) - 1  # a push may end at slightly different times
+    last = abs(float(coarser.tip_deflection[-1] - finer.tip_deflection[-1]))
+    before = np.abs(coarser.tip_deflection[:common] - finer.tip_deflection[:common])
+    return max(last, float(np.max(before, initial=0.0))) / scale
 
 
 def _stepper(job: _Job) -> Stepper:
     if job.choice.analysis == "dynamic":
         return DynamicStepper(job.plant, collocation(job.scene.numerics.spectral_radius))
-    return StaticStepper(job.plant) if job.choice.analysis == "static" else inertia_free_stepper(job.plant)
+    if job.choice.analysis == "static":
+        return StaticStepper(job.plant)
+    return inertia_free_stepper(job.plant)
 
 
 def _begin(job: _Job, grid: TimeGrid) -> None:
     job.observer.begin(job.plant, _settings(job, grid) | {"output_times": grid.outputs})
 
 
-def _collect(job: _Job, grid: TimeGrid, samples: list[Sample], *, live: bool) -> str:
-    """Append the samples of a run and return why it stopped.
+def _march(job: _Job, grid: TimeGrid) -> Generator[Sample, None, RunEnd]:
+    stepper = _stepper(job)
+    if job.scene.insertion.kind == "force" and isinstance(stepper, DynamicStepper):
+        return march_pushed(job.plant, stepper, grid)
+    return march(job.plant, stepper, grid)
+
+
+def _collect(job: _Job, grid: TimeGrid, samples: list[Sample], *, live: bool) -> RunEnd:
+    """Append the samples of a run and return how it ended.
 
     Raises
     ------
@@ -237,7 +251,12 @@ def _collect(job: _Job, grid: TimeGrid, samples: list[Sample], *, live: bool) ->
         With ``partial``, the trajectory so far.
     """
     try:
-        for sample in march(job.plant, _stepper(job), grid):
+        marching = _march(job, grid)
+        while True:
+            try:
+                sample = next(marching)
+            except StopIteration as finished:
+                return finished.value
             samples.append(sample)
             job.observer.progress(sample.time / grid.outputs[-1])
             if live:
@@ -245,18 +264,16 @@ def _collect(job: _Job, grid: TimeGrid, samples: list[Sample], *, live: bool) ->
     except KeyboardInterrupt:
         if not samples:
             raise
-        return "interrupted"
+        return RunEnd("interrupted", grid.steps)
     except ComputationError as error:
         if not live:
             for sample in samples:
                 job.observer.sample(sample)
-        error.partial = _trajectory(job, grid, samples, None, "failed") if samples else None
+        error.partial = _trajectory(job, grid, samples, None, RunEnd("failed", grid.steps)) if samples else None
         raise
-    ends_by_itself = job.scene.run.duration is None and job.scene.insertion.final_depth is not None
-    return "final-depth" if ends_by_itself else "duration"
 
 
-def _trajectory(job: _Job, grid: TimeGrid, samples: list[Sample], time_error: float | None, stop: str) -> Trajectory:
+def _trajectory(job: _Job, grid: TimeGrid, samples: list[Sample], time_error: float | None, end: RunEnd) -> Trajectory:
     now = clock.perf_counter()
     run = trajectory_from_samples(job.plant, samples, {}, job.scene)
     estimate = None if time_error is None else _total(job, time_error)
@@ -266,7 +283,8 @@ def _trajectory(job: _Job, grid: TimeGrid, samples: list[Sample], time_error: fl
         | {
             "error_estimate": estimate,
             "warnings": [],
-            "stop_reason": stop,
+            "stop_reason": end.reason,
+            "steps": end.steps,
             "solve_time": now - job.started,
             "wall_time": now - job.started,
         }

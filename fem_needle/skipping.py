@@ -38,7 +38,8 @@ class Skipped:
 def inertia_free_stepper(plant: Plant) -> Stepper:
     """Return equilibria where the tissue has no memory, creep (L-stable) where it is viscous or remembers a path."""
     tissue = plant.scene.tissue
-    if tissue.rest_line == "cut-path" or any(layer.damping > 0 for layer in tissue.layers):
+    remembers = tissue.rest_line == "cut-path" or plant.scene.insertion.kind == "force"
+    if remembers or any(layer.damping > 0 for layer in tissue.layers):
         return DynamicStepper(Massless(plant), collocation(0.0), inertia=False)
     return StaticStepper(plant)
 

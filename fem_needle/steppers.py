@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fem_needle.collocation import Collocation, gauss
 from fem_needle.ledger import StepEnd
 from fem_needle.loads import LoadCase, is_steady, load_case
-from fem_needle.motion import DepthLaw
+from fem_needle.motion import Motion
 from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Plant
 from fem_needle.stages import (
@@ -72,10 +72,10 @@ class Stepper(Protocol):
     def inertia(self) -> bool:
         """Whether the needle's inertia acts."""
 
-    def start(self, law: DepthLaw, time: float, until: float, before: StepEnd) -> StepEnd:
+    def start(self, law: Motion, time: float, until: float, before: StepEnd) -> StepEnd:
         """Return the state just after a time, given the state just before."""
 
-    def advance(self, law: DepthLaw, start: StepEnd, until: float, last: Step | None) -> Step:
+    def advance(self, law: Motion, start: StepEnd, until: float, last: Step | None) -> Step:
         """Return the step from a state to a time."""
 
 
@@ -104,7 +104,7 @@ class DynamicStepper:
     def __post_init__(self) -> None:
         object.__setattr__(self, "_steady", is_steady(self.plant.scene))
 
-    def start(self, law: DepthLaw, time: float, until: float, before: StepEnd) -> StepEnd:
+    def start(self, law: Motion, time: float, until: float, before: StepEnd) -> StepEnd:
         """Carry coordinates and momentum over a possible jump of speed or of the hub's velocity."""
         middle = law.depth(0.5 * (time + until))
         stage = evaluate_stage(self.plant, law.after(time), self._loads(middle, time, before.stage), before.stage)
@@ -114,7 +114,7 @@ class DynamicStepper:
             stage = with_path(self.plant, stage, path)
         return self._state(stage, solution.coordinates, solution.momentum, solution.forces, path)
 
-    def advance(self, law: DepthLaw, start: StepEnd, until: float, last: Step | None) -> Step:
+    def advance(self, law: Motion, start: StepEnd, until: float, last: Step | None) -> Step:
         """Solve the stages and extrapolate their polynomial to the end.
 
         Where the tip cuts a path, the path under the stages depends on their own tips: solved by iteration, which contracts by about
@@ -131,7 +131,7 @@ class DynamicStepper:
             tips = found
         raise FloatingPointError("the cut path does not converge")
 
-    def _attempt(self, law: DepthLaw, start: StepEnd, until: float, last: Step | None, cut: _Cut | None) -> Step:
+    def _attempt(self, law: Motion, start: StepEnd, until: float, last: Step | None, cut: _Cut | None) -> Step:
         """Solve one step, with the path cut through given tips at the nodes where there is one."""
         time = start.stage.instant.time
         length, middle = until - time, law.depth(0.5 * (time + until))
@@ -201,7 +201,7 @@ class DynamicStepper:
         return forces[:guides]
 
     def _stages(
-        self, law: DepthLaw, start: StepEnd, until: float, last: Step | None, cut: _Cut | None
+        self, law: Motion, start: StepEnd, until: float, last: Step | None, cut: _Cut | None
     ) -> tuple[Stage, Stage]:
         time, earlier = start.stage.instant.time, start.stage
         length, middle, latest = until - time, law.depth(0.5 * (time + until)), nextafter(until, time)
@@ -272,11 +272,11 @@ class StaticStepper:
     inertia: bool = False
     method: Collocation = field(default_factory=lambda: gauss(3))
 
-    def start(self, law: DepthLaw, time: float, until: float, before: StepEnd) -> StepEnd:
+    def start(self, law: Motion, time: float, until: float, before: StepEnd) -> StepEnd:
         """Return the equilibrium just after a time."""
         return self._rest(law, law.after(time).time, law.depth(0.5 * (time + until)), after=True)
 
-    def advance(self, law: DepthLaw, start: StepEnd, until: float, last: Step | None) -> Step:
+    def advance(self, law: Motion, start: StepEnd, until: float, last: Step | None) -> Step:
         """Return the equilibria at the nodes and at the end."""
         time = start.stage.instant.time
         length, middle = until - time, law.depth(0.5 * (time + until))
@@ -285,7 +285,7 @@ class StaticStepper:
         stages, solutions = tuple(node.stage for node in nodes), tuple(node.solution for node in nodes)
         return Step(self.method, length, (start, end), stages, solutions)
 
-    def _rest(self, law: DepthLaw, time: float, layer_depth: float, *, after: bool) -> StepEnd:
+    def _rest(self, law: Motion, time: float, layer_depth: float, *, after: bool) -> StepEnd:
         instant = law.after(time) if after else law.before(time)
         case = load_case(self.plant.scene, layer_depth, time if after else nextafter(time, -inf))
         stage = evaluate_stage(self.plant, instant, case)

@@ -41,11 +41,15 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "push_work": ("J", "work of the push since the start"),
     "friction_dissipation": ("J", "energy lost in shaft friction since the start"),
     "cutting_work": ("J", "work spent on cutting since the start"),
+    "arrest_loss": ("J", "axial energy lost where a membrane stopped the needle, since the start"),
+    "axial_energy_residual": ("J", "axial energy minus its start value and all axial works"),
     "axial_kinetic_energy": ("J", "kinetic energy of the insertion"),
 }
 
 _FROM_SAMPLES = tuple(
-    name for name in VARIABLES if name not in {"tip_deflection", "tip_angle", "energy_residual", "push_work"}
+    name
+    for name in VARIABLES
+    if name not in {"tip_deflection", "tip_angle", "energy_residual", "axial_energy_residual"}
 )
 
 
@@ -155,7 +159,10 @@ def trajectory_from_samples(
     gained = series["load_work"] + series["hub_work"] + series["tissue_work"] + series["boundary_energy"]
     series["energy_residual"] = energy - energy[0] - (gained - series["tissue_dissipation"])
     axial = series["axial_kinetic_energy"] - series["axial_kinetic_energy"][0]
-    series["push_work"] = axial + series["friction_dissipation"] + series["cutting_work"] + series["boundary_energy"]
+    taken = series["friction_dissipation"] + series["cutting_work"] + series["boundary_energy"] + series["arrest_loss"]
+    if scene.insertion.kind != "force":  # the push of a prescribed motion is what its balance needs
+        series["push_work"] = axial + taken
+    series["axial_energy_residual"] = axial + taken - series["push_work"]
     return Trajectory(
         scene=scene,
         time=np.array([s.time for s in samples]),

@@ -89,7 +89,8 @@ class LineMesh:
         size = self.lengths[where]
         place = np.clip((positions - self.nodes[where]) / size, 0.0, 1.0)
         shapes = self.reference.unit_shapes(place, derivative) * self.scales[where].T / size**derivative
-        return self.reference.stride * where + np.arange(self.reference.count)[:, None], shapes
+        columns = self.reference.stride * where + np.arange(self.reference.count)[:, None]
+        return columns.astype(np.intp), shapes
 
 
 def uniform_mesh(length: float, elements: int, degree: int) -> LineMesh:
