@@ -30,6 +30,8 @@ class Collocation:
         b A^-1: the polynomial's value at the end of the step from its values at the nodes.
     start_slope, end_slope
         Its derivative at the start and at the end, likewise.
+    power_slopes
+        Derivatives at the start and at the end (rows) of the polynomial through values at the start, the nodes and the end.
     """
 
     nodes: Array
@@ -38,6 +40,7 @@ class Collocation:
     end: Array
     start_slope: Array
     end_slope: Array
+    power_slopes: Array
 
 
 @lru_cache
@@ -70,4 +73,14 @@ def _with_nodes(nodes: Array) -> Collocation:
         end=weights @ inverse,
         start_slope=at_start @ inverse,
         end_slope=at_end @ inverse,
+        power_slopes=_slopes_through(nodes),
     )
+
+
+def _slopes_through(nodes: Array) -> Array:
+    """Return the end derivatives of the polynomial through 0, the nodes and 1; a node at 1 counts once."""
+    places = np.unique(np.concatenate([[0.0], nodes, [1.0]]))
+    count = len(places)
+    powers = np.linalg.inv(np.vander(places, count, increasing=True))
+    slopes = np.stack([powers[1], np.arange(count) @ powers])
+    return slopes if count == len(nodes) + 2 else np.insert(slopes, count - 1, 0.0, axis=1)

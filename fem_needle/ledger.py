@@ -102,18 +102,27 @@ def axial_momentum(stage: Stage, coordinates: Array, velocities: Array) -> float
 
 def configuration_force(plant: Plant, stage: Stage, solution: StageSolution, *, inertia: bool = True) -> float:
     """Return dL/dz and the tissue's drag along z [N]: the axial force A without -d(dT/dv)/dt."""
-    coordinates, velocities, forces = solution.coordinates, solution.velocities, solution.forces
-    operators, points, instant = stage.operators, stage.points, stage.instant
-    force = -0.5 * float(
-        coordinates @ plant.stiffness_rate_product(coordinates, instant.depth, instant.time)
-    )
+    return energy_force(plant, stage, solution, inertia=inertia) + contact_force(stage, solution)
+
+
+def energy_force(plant: Plant, stage: Stage, solution: StageSolution, *, inertia: bool = True) -> float:
+    """Return d(T - U)/dz [N], the part of the axial force that is quadratic in the needle's own state."""
+    coordinates, instant = solution.coordinates, stage.instant
+    moved = plant.stiffness_rate_product(coordinates, instant.depth, instant.time)
+    force = -0.5 * float(coordinates @ moved)
     if stage.rest is not None:
         force += stage.factor * (float(coordinates @ stage.rest.load_rate) - stage.rest.constant_rate)
-    force += float(forces @ (points.row_rates @ coordinates) + 0.5 * forces @ points.flexibility_rate @ forces)
     if inertia:
-        force += plant.kinetic_rate(velocities, coordinates, instant.depth, instant.speed)
-    force -= form(operators.drag, velocities, coordinates)
-    return force - instant.speed * form(operators.slip, coordinates, coordinates)
+        force += plant.kinetic_rate(solution.velocities, coordinates, instant.depth, instant.speed)
+    return force
+
+
+def contact_force(stage: Stage, solution: StageSolution) -> float:
+    """Return what points and viscous tissue add to the axial force [N]."""
+    coordinates, forces, points = solution.coordinates, solution.forces, stage.points
+    force = float(forces @ (points.row_rates @ coordinates) + 0.5 * forces @ points.flexibility_rate @ forces)
+    force -= form(stage.operators.drag, solution.velocities, coordinates)
+    return force - stage.instant.speed * form(stage.operators.slip, coordinates, coordinates)
 
 
 def dissipation(stage: Stage, solution: StageSolution) -> float:
@@ -135,48 +144,106 @@ class StepEnd:
     path: CutPath | None = None
 
 
-def step_works(
-    plant: Plant,
-    method: Collocation,
-    step: float,
-    ends: tuple[StepEnd, StepEnd],
-    stages: tuple[Stage, ...],
-    solutions: tuple[StageSolution, ...],
-    *,
-    inertia: bool = True,
-) -> Works:
-    """Return the works of one smooth step, by the method's own quadrature.
+@dataclass(frozen=True, eq=False)
+class StepParts:
+    """What the works of one smooth step are computed from.
+
+    Attributes
+    ----------
+    plant, method, length
+        Model, nodes and weights, duration [s].
+    ends
+        State just after the start and just before the end.
+    stages, solutions
+        Plant and state at the nodes.
+    """
+
+    plant: Plant
+    method: Collocation
+    length: float
+    ends: tuple[StepEnd, StepEnd]
+    stages: tuple[Stage, ...]
+    solutions: tuple[StageSolution, ...]
+
+
+def step_works(parts: StepParts, *, inertia: bool) -> Works:
+    """Return the works of one smooth step; a row of equal steps also needs the `row_correction` of its first and last one.
 
     Products with a rate are integrated by parts, so that only known rates (of loads, speed and hub) are needed:
     integral F d(deflection) = [F deflection] - integral dF/dt deflection dt.
     """
-    guides = stages[0].points.guides
-    load = hub = swelling = lost = boundary = 0.0
-    for end, sign in zip(ends, (-1.0, 1.0), strict=True):
-        solution, speed = end.solution, end.stage.instant.speed
-        reached = end.stage.points.deflections(solution.coordinates, solution.forces)[guides:]
+    works = _end_products(parts, inertia=inertia)
+    for weight, stage, solution in zip(parts.method.weights * parts.length, parts.stages, parts.solutions, strict=True):
+        works = works + _node_works(weight, stage, solution, inertia=inertia)
+    if any(stage.instant.speed or stage.instant.acceleration for stage in parts.stages):
+        works = works + Works(boundary_energy=_moving_work(parts, inertia=inertia))
+    return works
+
+
+def _end_products(parts: StepParts, *, inertia: bool) -> Works:
+    """Return the products at the ends: [F deflection], [v dT/dv], [hub velocity momentum]."""
+    load = hub = boundary = 0.0
+    for end, sign in zip(parts.ends, (-1.0, 1.0), strict=True):
+        solution, stage = end.solution, end.stage
+        guides = stage.points.guides
+        reached = stage.points.deflections(solution.coordinates, solution.forces)[guides:]
         load += sign * float(solution.forces[guides:] @ reached)
-        if inertia and speed:
-            boundary += sign * speed * axial_momentum(end.stage, solution.coordinates, solution.velocities)
-        if inertia and np.any(end.stage.case.clamp_rates):
-            hub += sign * float(end.stage.case.clamp_rates @ solution.momentum[:2])
-    for weight, stage, solution in zip(method.weights * step, stages, solutions, strict=True):
-        instant = stage.instant
-        if np.any(stage.case.force_rates):
-            reached = stage.points.deflections(solution.coordinates, solution.forces)[guides:]
-            load -= weight * float(stage.case.force_rates @ reached)
-        hub += weight * _hub_power(stage, solution, inertia=inertia)
-        swelling += weight * 0.5 * form(stage.operators.tissue_rate, solution.coordinates, solution.coordinates)
-        if stage.rest is not None and stage.factor_rate:
-            swelling += weight * stage.factor_rate * rest_energy(stage.rest, solution.coordinates)
-        if stage.operators.damping is not None:
-            lost += weight * dissipation(stage, solution)
-        if instant.speed:
-            boundary -= weight * instant.speed * configuration_force(plant, stage, solution, inertia=inertia)
-        if inertia and instant.acceleration:
-            axial = axial_momentum(stage, solution.coordinates, solution.velocities)
-            boundary -= weight * instant.acceleration * axial
-    return Works(load, hub, swelling, lost, boundary)
+        if inertia and stage.instant.speed:
+            boundary += sign * stage.instant.speed * axial_momentum(stage, solution.coordinates, solution.velocities)
+        if inertia and np.any(stage.case.clamp_rates):
+            hub += sign * float(stage.case.clamp_rates @ solution.momentum[:2])
+    return Works(load_work=load, hub_work=hub, boundary_energy=boundary)
+
+
+def _node_works(weight: float, stage: Stage, solution: StageSolution, *, inertia: bool) -> Works:
+    """Return a node's share of the integrals that the method's own quadrature gives exactly as it moves the needle."""
+    load = swelling = 0.0
+    if np.any(stage.case.force_rates):
+        guides = stage.points.guides
+        load = -float(stage.case.force_rates @ stage.points.deflections(solution.coordinates, solution.forces)[guides:])
+    if stage.operators.tissue_rate is not None:
+        swelling = 0.5 * form(stage.operators.tissue_rate, solution.coordinates, solution.coordinates)
+    if stage.rest is not None and stage.factor_rate:
+        swelling += stage.factor_rate * rest_energy(stage.rest, solution.coordinates)
+    return Works(
+        load_work=weight * load,
+        hub_work=weight * _hub_power(stage, solution, inertia=inertia),
+        tissue_work=weight * swelling,
+        tissue_dissipation=weight * dissipation(stage, solution) if stage.operators.damping is not None else 0.0,
+        boundary_energy=-weight * stage.instant.speed * contact_force(stage, solution) if stage.instant.speed else 0.0,
+    )
+
+
+def _moving_work(parts: StepParts, *, inertia: bool) -> float:
+    """Return -integral (v d(T - U)/dz + dv/dt dT/dv) dt [J].
+
+    With inertia by the trapezoidal rule on the ends of the steps, corrected at the ends of a row of equal steps (Euler and
+    Maclaurin, order 4): at the ends vibrations too fast for the step keep their whole amplitude, at the nodes they do not, and
+    the energy that they gain or lose as the needle moves would be missed. Without inertia by the method's own quadrature.
+    """
+    if inertia:
+        start, end = (_moving_power(parts.plant, state.stage, state.solution, inertia=True) for state in parts.ends)
+        return 0.5 * parts.length * (start + end)
+    powers = [_moving_power(parts.plant, *node, inertia=False) for node in zip(parts.stages, parts.solutions, strict=True)]
+    return parts.length * float(parts.method.weights @ np.array(powers))
+
+
+def _moving_power(plant: Plant, stage: Stage, solution: StageSolution, *, inertia: bool) -> float:
+    power = -stage.instant.speed * energy_force(plant, stage, solution, inertia=inertia)
+    if inertia and stage.instant.acceleration:
+        power -= stage.instant.acceleration * axial_momentum(stage, solution.coordinates, solution.velocities)
+    return power
+
+
+def row_correction(parts: StepParts, *, inertia: bool, at_start: bool) -> Works:
+    """Return what the first (``at_start``) or the last step of a row of equal steps adds to the trapezoidal rule."""
+    if not inertia or not any(stage.instant.speed or stage.instant.acceleration for stage in parts.stages):
+        return Works()
+    first, second = ((end.stage, end.solution) for end in parts.ends)
+    states = [first, *zip(parts.stages, parts.solutions, strict=True), second]
+    powers = np.array([_moving_power(parts.plant, *state, inertia=True) for state in states])
+    slopes = parts.method.power_slopes @ powers
+    return Works(boundary_energy=parts.length / 12 * float(slopes[0] if at_start else -slopes[1]))
 
 
 def jump_works(before: StepEnd, after: StepEnd) -> Works:

@@ -13,7 +13,7 @@ from fem_needle import axial
 from fem_needle.banded import SingularMatrixError
 from fem_needle.errors import ComputationError
 from fem_needle.initial import initial_state
-from fem_needle.ledger import StepEnd, Works, energies, jump_works, step_works
+from fem_needle.ledger import StepEnd, Works, energies, jump_works, row_correction, step_works
 from fem_needle.motion import DepthLaw, depth_law, landing_times, run_duration
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample, sample_step
@@ -92,7 +92,7 @@ def march(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample, N
     ComputationError
         If a step cannot be solved or gives numbers that are not finite; says at which time and depth.
     """
-    law = depth_law(plant.scene)
+    law, inertia = depth_law(plant.scene), stepper.inertia
     state, works, last = initial_state(plant, law), Works(), None
     landings, outputs = set(grid.landings) | {0.0}, set(grid.outputs)
     deepest = law.depth(0.0)
@@ -105,11 +105,13 @@ def march(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample, N
                 works = works if time == 0.0 else works + work
             step = _advance(plant, stepper, law, state, until, last)
             if time == 0.0:
-                yield sample_step(plant, step, works, deepest, law.depth(0.0), at_start=True, inertia=stepper.inertia)
+                yield sample_step(plant, step, works, deepest, law.depth(0.0), at_start=True, inertia=inertia)
+            works = works + row_change(last, step, landed=time in landings, inertia=inertia)
             works = works + _works_of(plant, stepper, step, deepest)
             state, last, deepest = step.ends[1], step, max(deepest, law.depth(until))
         if end in outputs:
-            yield sample_step(plant, step, works, deepest, law.depth(end), at_start=False, inertia=stepper.inertia)
+            shown = works + row_correction(step, inertia=inertia, at_start=False)
+            yield sample_step(plant, step, shown, deepest, law.depth(end), at_start=False, inertia=inertia)
     ends_by_itself = plant.scene.run.duration is None and plant.scene.insertion.final_depth is not None
     return RunEnd("final-depth" if ends_by_itself else "duration", grid.steps)
 
@@ -145,8 +147,18 @@ def _failed(time: float, depth: float, what: str) -> ComputationError:
     )
 
 
+def row_change(last: Step | None, step: Step, *, landed: bool, inertia: bool) -> Works:
+    """Return the corrections where one row of equal steps ends and another begins."""
+    if last is None:
+        return row_correction(step, inertia=inertia, at_start=True)
+    if not landed and abs(last.length - step.length) <= 1e-9 * step.length:
+        return Works()
+    ended = row_correction(last, inertia=inertia, at_start=False)
+    return ended + row_correction(step, inertia=inertia, at_start=True)
+
+
 def _works_of(plant: Plant, stepper: Stepper, step: Step, deepest: float) -> Works:
-    works = step_works(plant, step.method, step.length, step.ends, step.stages, step.solutions, inertia=stepper.inertia)
+    works = step_works(step, inertia=stepper.inertia)
     friction = cutting = 0.0
     for weight, stage in zip(step.method.weights * step.length, step.stages, strict=True):
         depth, speed = stage.instant.depth, stage.instant.speed

@@ -11,8 +11,8 @@ from fem_needle import axial
 from fem_needle.banded import SingularMatrixError
 from fem_needle.errors import ComputationError
 from fem_needle.initial import initial_state
-from fem_needle.ledger import Works, jump_works, step_works
-from fem_needle.march import RunEnd, TimeGrid
+from fem_needle.ledger import Works, jump_works, row_correction, step_works
+from fem_needle.march import RunEnd, TimeGrid, row_change
 from fem_needle.motion import depth_law
 from fem_needle.plant import Plant
 from fem_needle.pushing import Limits, Pusher, PushState, PushStep, StepMotion, first_event, locate
@@ -51,6 +51,7 @@ class _Run:
     works: Works
     last: Step | None = None
     steps: int = 0
+    landed: bool = False
 
 
 def march_pushed(plant: Plant, stepper: DynamicStepper, grid: TimeGrid) -> Generator[Sample, None, RunEnd]:
@@ -116,15 +117,10 @@ def _take(pusher: Pusher, run: _Run, step: PushStep) -> None:
     """Add a step's works, and stop a needle dead at a membrane that it cannot pierce."""
     lateral = step.lateral
     run.works = run.works + jump_works(run.state.end, lateral.ends[0]) if pusher.stepper.inertia and run.steps else run.works
-    run.works = run.works + step.works + step_works(
-        pusher.stepper.plant,
-        lateral.method,
-        lateral.length,
-        lateral.ends,
-        lateral.stages,
-        lateral.solutions,
-        inertia=pusher.stepper.inertia,
-    )
+    inertia = pusher.stepper.inertia
+    run.works = run.works + row_change(run.last, lateral, landed=run.landed, inertia=inertia)
+    run.works = run.works + step.works + step_works(lateral, inertia=inertia)
+    run.landed = step.event is not None
     run.state, run.last, run.steps = step.state, lateral, run.steps + 1
     if step.event == "reaches":
         _meet_membrane(pusher, run)
@@ -169,15 +165,16 @@ def _is_stuck(pusher: Pusher, state: PushState) -> bool:
 
 
 def _sample(pusher: Pusher, run: _Run, step: PushStep, *, at_start: bool) -> Sample:
-    state, scene = run.state, pusher.scene
+    state, scene, inertia = run.state, pusher.scene, pusher.stepper.inertia
+    shown = run.works if at_start else run.works + row_correction(step.lateral, inertia=inertia, at_start=False)
     sample = sample_step(
         pusher.stepper.plant,
         step.lateral,
-        run.works,
+        shown,
         state.deepest,
         state.depth,
         at_start=at_start,
-        inertia=pusher.stepper.inertia,
+        inertia=inertia,
     )
     push = pusher.push(sample.time)
     friction = axial.friction_force(scene, state.depth, state.speed) if state.speed else push + state.axial_force

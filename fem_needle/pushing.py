@@ -2,9 +2,10 @@
 
     rho A l dv/dt = f - friction - cutting + A
 
-In momentum form with Pi = rho A l v + dT/dv (the lateral kinetic energy depends on v under ``entry``), at the nodes of the lateral
-method:  Pi' = f - friction - cutting + (A without -d(dT/dv)/dt). A step iterates between the lateral stages on a trial motion and
-the 2 x 2 axial equations, in which viscous friction is implicit; it contracts by about (step)^2 times dA/dz over the mass.
+In momentum form with Pi = rho A l v + dT/dv (the lateral kinetic energy depends on v under ``entry``), at the nodes of the
+lateral method:  Pi' = f - friction - cutting + (A without -d(dT/dv)/dt). A step iterates between the lateral stages on a trial
+motion and the 2 x 2 axial equations, in which viscous friction is implicit; it contracts by about (step)^2 times dA/dz over the
+mass.
 """
 
 from __future__ import annotations

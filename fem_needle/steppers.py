@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.collocation import Collocation, gauss
-from fem_needle.ledger import StepEnd
+from fem_needle.ledger import StepEnd, StepParts
 from fem_needle.loads import LoadCase, is_steady, load_case
 from fem_needle.motion import Motion
 from fem_needle.path import CutPath
@@ -40,28 +40,9 @@ PATH_TOLERANCE = 1e-13  # of the largest tip deflection of the step
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
-    """One smooth step.
+class Step(StepParts):
+    """One smooth step, and its factored matrix for the next one where nothing moves."""
 
-    Attributes
-    ----------
-    method
-        Nodes and weights of the stages.
-    length
-        Duration [s].
-    ends
-        State just after the start and just before the end.
-    stages, solutions
-        The plant and its state at the nodes.
-    system
-        The factored matrix, for the next step where nothing moves.
-    """
-
-    method: Collocation
-    length: float
-    ends: tuple[StepEnd, StepEnd]
-    stages: tuple[Stage, ...]
-    solutions: tuple[StageSolution, ...]
     system: StepSystem | None = None
 
 
@@ -117,8 +98,8 @@ class DynamicStepper:
     def advance(self, law: Motion, start: StepEnd, until: float, last: Step | None) -> Step:
         """Solve the stages and extrapolate their polynomial to the end.
 
-        Where the tip cuts a path, the path under the stages depends on their own tips: solved by iteration, which contracts by about
-        the step's advance over the tissue's characteristic length.
+        Where the tip cuts a path, the path under the stages depends on their own tips: solved by iteration, which contracts by
+        about the step's advance over the tissue's characteristic length.
         """
         if start.path is None:
             return self._attempt(law, start, until, last, None)
@@ -151,7 +132,7 @@ class DynamicStepper:
             stage = with_path(self.plant, stage, path, history)
         forces = np.concatenate([self._end_reactions(stage, end_coordinates, solutions), case.forces])
         end = self._state(stage, end_coordinates, end_momentum, forces, path)
-        return Step(self.method, length, (start, end), stages, solutions, system)
+        return Step(self.plant, self.method, length, (start, end), stages, solutions, system)
 
     def _predicted_tips(self, start: StepEnd, until: float, last: Step | None) -> Array:
         """Return the tips at the nodes as the last step's polynomial continues, the present tip without one."""
@@ -159,8 +140,9 @@ class DynamicStepper:
         if last is None:
             return np.full(len(self.method.nodes), tip)
         found = [self._tip(*pair) for pair in zip(last.stages, last.solutions, strict=True)]
-        rate = sum(w * (value - self._tip(last.ends[0].stage, last.ends[0].solution)) for w, value in zip(self.method.end_slope, found, strict=True))
-        return tip + float(rate) / last.length * self.method.nodes * length
+        before = self._tip(last.ends[0].stage, last.ends[0].solution)
+        rate = float(self.method.end_slope @ (np.array(found) - before)) / last.length
+        return tip + rate * self.method.nodes * length
 
     def _cut(self, start: StepEnd, path: CutPath, depths: list[float], tips: list[float]) -> CutPath:
         """Return the path after the tip has passed given depths with given deflections."""
@@ -283,7 +265,7 @@ class StaticStepper:
         nodes = [self._rest(law, time + node * length, middle, after=True) for node in self.method.nodes]
         end = self._rest(law, until, middle, after=False)
         stages, solutions = tuple(node.stage for node in nodes), tuple(node.solution for node in nodes)
-        return Step(self.method, length, (start, end), stages, solutions)
+        return Step(self.plant, self.method, length, (start, end), stages, solutions)
 
     def _rest(self, law: Motion, time: float, layer_depth: float, *, after: bool) -> StepEnd:
         instant = law.after(time) if after else law.before(time)

@@ -90,7 +90,7 @@ class LineMesh:
         place = np.clip((positions - self.nodes[where]) / size, 0.0, 1.0)
         shapes = self.reference.unit_shapes(place, derivative) * self.scales[where].T / size**derivative
         columns = self.reference.stride * where + np.arange(self.reference.count)[:, None]
-        return columns.astype(np.intp), shapes
+        return np.asarray(columns, dtype=np.intp), shapes
 
 
 def uniform_mesh(length: float, elements: int, degree: int) -> LineMesh:
