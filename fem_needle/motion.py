@@ -31,6 +31,9 @@ class Instant:
 class Motion(Protocol):
     """What a stepper asks of the insertion over one step."""
 
+    def layer_depth(self, start: float, end: float) -> float:
+        """Return a depth [m] in the layer that holds the tip between two times: steps land on interfaces."""
+
     def depth(self, time: float) -> float:
         """Return z(t) [m]."""
 
@@ -64,6 +67,10 @@ class DepthLaw:
         if time >= self.rests_from and insertion.final_depth is not None:
             return insertion.final_depth
         return self._unstopped(time)
+
+    def layer_depth(self, start: float, end: float) -> float:
+        """Return the depth in the middle of a step [m]."""
+        return self.depth(0.5 * (start + end))
 
     def speed(self, time: float) -> float:
         """Return dz/dt from the right [m/s]."""

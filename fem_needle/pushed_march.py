@@ -135,7 +135,7 @@ def _meet_membrane(pusher: Pusher, run: _Run) -> None:
         run.state = replace(state, punctured=state.punctured | {hold.membrane})
         return
     # Arrested: momentum P is continuous, the speed is not; what the lateral motion does not take is lost.
-    stopped = StepMotion(pusher.stepper.method, state.time, 1.0, state.depth, np.zeros(4))
+    stopped = StepMotion(pusher.stepper.method, state.time, 1.0, state.depth, np.zeros(4), 0)
     after = pusher.stepper.start(stopped, state.time, state.time, state.end)
     jump = jump_works(state.end, after) if pusher.stepper.inertia else Works()
     lost = 0.5 * pusher.mass * state.speed**2 - jump.boundary_energy

@@ -11,7 +11,7 @@ mass.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import copysign
+from math import copysign, inf, nextafter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,11 @@ class StepMotion:
     length: float
     start_depth: float
     speeds: Array
+    direction: int
+
+    def layer_depth(self, start: float, end: float) -> float:
+        """Return a depth just ahead of the start: a step ends at an interface, also while it is being tried."""
+        return nextafter(self.start_depth, self.direction * inf) if self.direction else self.start_depth
 
     def depth(self, time: float) -> float:
         """Return z: the collocation polynomial, whose slope is the line through the nodes' speeds."""
@@ -142,7 +147,7 @@ class Pusher:
         return self._slide(state, until, last, direction)
 
     def _rest(self, state: PushState, until: float, last: Step | None) -> PushStep:
-        motion = StepMotion(self.stepper.method, state.time, until - state.time, state.depth, np.zeros(4))
+        motion = StepMotion(self.stepper.method, state.time, until - state.time, state.depth, np.zeros(4), 0)
         start = self.stepper.start(motion, state.time, until, state.end)
         lateral = self.stepper.advance(motion, start, until, last)
         after = replace(state, end=lateral.ends[1], speed=0.0, axial_force=self.axial_force(lateral))
@@ -152,7 +157,7 @@ class Pusher:
         method, length = self.stepper.method, until - state.time
         speeds = np.full(4, state.speed)
         for _ in range(MOST_ITERATIONS):
-            motion = StepMotion(method, state.time, length, state.depth, speeds)
+            motion = StepMotion(method, state.time, length, state.depth, speeds, direction)
             start = self.stepper.start(motion, state.time, until, state.end)
             last = self.stepper.advance(motion, start, until, last)
             found, forces = self._speeds(last, state, direction)
@@ -160,7 +165,7 @@ class Pusher:
             speeds = found
             if change <= SPEED_TOLERANCE * np.max(np.abs(speeds)):
                 return self._slid(state, last, motion, forces)
-        raise FloatingPointError("the insertion speed does not converge")
+        raise FloatingPointError(f"the insertion speed does not converge {change} {speeds} {length} {state.time}")
 
     def _speeds(self, step: Step, state: PushState, direction: int) -> tuple[Array, _AxialForces]:
         """Return the speeds at start, nodes and end that the axial equations give on the lateral solution of a trial motion."""
@@ -176,15 +181,16 @@ class Pusher:
         return np.array([state.speed, *nodes, end]), forces
 
     def _forces(self, step: Step, state: PushState, direction: int) -> _AxialForces:
-        constant, viscous, cutting = [], [], []
+        constant, viscous = [], []
+        ahead = nextafter(state.depth, direction * inf)
+        cutting = axial.cutting_force(self.scene, ahead, float(direction), state.deepest)
         for stage, solution in zip(step.stages, step.solutions, strict=True):
             time, depth = stage.instant.time, stage.instant.depth
             lateral = configuration_force(self.stepper.plant, stage, solution, inertia=self.stepper.inertia)
-            cutting.append(axial.cutting_force(self.scene, depth, float(direction), state.deepest))
             friction = direction * axial.coulomb_force(self.scene, depth)
-            constant.append(self.push(time) - friction - cutting[-1] + lateral)
+            constant.append(self.push(time) - friction - cutting + lateral)
             viscous.append(axial.viscous_coefficient(self.scene, depth))
-        return _AxialForces(np.array(constant), np.array(viscous), np.array(cutting))
+        return _AxialForces(np.array(constant), np.array(viscous), cutting)
 
     def _slid(self, state: PushState, step: Step, motion: StepMotion, forces: _AxialForces) -> PushStep:
         nodes, weights = motion.speeds[1:3], step.method.weights * step.length
@@ -192,7 +198,7 @@ class Pusher:
         coulomb = np.array([axial.coulomb_force(self.scene, stage.instant.depth) for stage in step.stages])
         works = Works(
             friction_dissipation=float(weights @ (coulomb * np.abs(nodes) + forces.viscous * nodes**2)),
-            cutting_work=float(weights @ (forces.cutting * nodes)),
+            cutting_work=forces.cutting * float(weights @ nodes),
             push_work=float(weights @ (pushes * nodes)),
         )
         end = step.ends[1]
@@ -226,7 +232,7 @@ class _AxialForces:
 
     constant: Array
     viscous: Array
-    cutting: Array
+    cutting: float
 
 
 def _momentum(end: StepEnd, inertia: bool) -> float:

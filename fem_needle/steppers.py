@@ -87,7 +87,7 @@ class DynamicStepper:
 
     def start(self, law: Motion, time: float, until: float, before: StepEnd) -> StepEnd:
         """Carry coordinates and momentum over a possible jump of speed or of the hub's velocity."""
-        middle = law.depth(0.5 * (time + until))
+        middle = law.layer_depth(time, until)
         stage = evaluate_stage(self.plant, law.after(time), self._loads(middle, time, before.stage), before.stage)
         solution = before.solution
         path = before.path
@@ -115,7 +115,7 @@ class DynamicStepper:
     def _attempt(self, law: Motion, start: StepEnd, until: float, last: Step | None, cut: _Cut | None) -> Step:
         """Solve one step, with the path cut through given tips at the nodes where there is one."""
         time = start.stage.instant.time
-        length, middle = until - time, law.depth(0.5 * (time + until))
+        length, middle = until - time, law.layer_depth(time, until)
         stages = self._stages(law, start, until, last, cut)
         system = _reusable(last, stages, length) or factor_step(self.plant, stages, self.method, length)
         begin = start.solution
@@ -186,14 +186,14 @@ class DynamicStepper:
         self, law: Motion, start: StepEnd, until: float, last: Step | None, cut: _Cut | None
     ) -> tuple[Stage, Stage]:
         time, earlier = start.stage.instant.time, start.stage
-        length, middle, latest = until - time, law.depth(0.5 * (time + until)), nextafter(until, time)
+        length, middle, latest = until - time, law.layer_depth(time, until), nextafter(until, time)
         found: list[Stage] = []
         for number, node in enumerate(self.method.nodes):
             instant = law.before(until) if node == 1.0 else law.after(time + node * length)
             if last is not None and last.stages[number].instant.depth == instant.depth:
                 earlier = last.stages[number]
             # A node at the end belongs to this step: loads and layers just before a kink.
-            case = self._loads(middle if node == 1.0 else instant.depth, min(instant.time, latest), earlier)
+            case = self._loads(middle, min(instant.time, latest), earlier)
             earlier = evaluate_stage(self.plant, instant, case, earlier)
             found.append(earlier)
         if cut is not None and start.path is not None:
@@ -256,12 +256,12 @@ class StaticStepper:
 
     def start(self, law: Motion, time: float, until: float, before: StepEnd) -> StepEnd:
         """Return the equilibrium just after a time."""
-        return self._rest(law, law.after(time).time, law.depth(0.5 * (time + until)), after=True)
+        return self._rest(law, law.after(time).time, law.layer_depth(time, until), after=True)
 
     def advance(self, law: Motion, start: StepEnd, until: float, last: Step | None) -> Step:
         """Return the equilibria at the nodes and at the end."""
         time = start.stage.instant.time
-        length, middle = until - time, law.depth(0.5 * (time + until))
+        length, middle = until - time, law.layer_depth(time, until)
         nodes = [self._rest(law, time + node * length, middle, after=True) for node in self.method.nodes]
         end = self._rest(law, until, middle, after=False)
         stages, solutions = tuple(node.stage for node in nodes), tuple(node.solution for node in nodes)
