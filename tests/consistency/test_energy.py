@@ -144,7 +144,7 @@ def test_needle_sliding_through_a_rigid_guide():
     assert residual_of(scene("hub", IN, GEL, FINGER, support=RIGID | eased), "dynamic") < 1e-6
 
 
-@pytest.mark.xfail(strict=True, reason="a rigid guide, undamped, after a jerk of the hub: 8e-5 at 1e-5 s, and not falling with the step")
+@pytest.mark.xfail(strict=True, reason="undamped rigid guide after a jerk of the hub: 8e-5, not falling with the step")
 def test_needle_sliding_through_a_rigid_guide_after_a_jerk():
     assert residual_of(scene("hub", IN, GEL, FINGER, support=RIGID | TURN), "dynamic") < 1e-6
 
