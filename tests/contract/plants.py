@@ -1,0 +1,49 @@
+"""The plants that must meet the contract: one list, where another model joins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fem_needle import FiniteElementNeedle
+from fem_needle.plant import Plant
+from fem_needle.scene import Guide, LateralLoad, Layer, Model, Scene, Sinusoid, TipLoad
+from tests.consistency.scenes import held, scene_of
+
+LAYERS = (
+    Layer(start=0.0, end=0.0437, foundation_modulus=5e3, damping=5.0),
+    Layer(start=0.05, end=0.0913, foundation_modulus=2e4),
+    Layer(start=0.0913, foundation_modulus=5e4, damping=20.0),
+)
+SWELLING = {"stiffness_factor": Sinusoid(mean=1.5, amplitude=0.5, frequency=2.0)}
+TIP = [TipLoad(force=0.1)]
+POINTS = [*TIP, LateralLoad(position=-0.0123, force=0.3)]
+GUIDES = {"guides": [Guide(position=-0.0317, stiffness=1e3), Guide(position=-0.0291)], "hub_angle": 0.01}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene and how a plant is made of it."""
+
+    scene: Scene
+    make: Callable[[Scene], Plant]
+
+    @property
+    def plant(self) -> Plant:
+        return self.make(self.scene)
+
+
+def _elements(count: int, degree: int) -> Callable[[Scene], Plant]:
+    return lambda scene: FiniteElementNeedle(scene, elements=count, degree=degree)
+
+
+CASES = {
+    f"elements of degree {degree}, {name}": Case(scene, _elements(7, degree))
+    for degree in (3, 4)
+    for name, scene in {
+        "entry": scene_of("entry", held(0.1), LAYERS, TIP, tissue=SWELLING),
+        "entry, fixed-frame": scene_of("entry", held(0.1), LAYERS, TIP, tissue=SWELLING, model=Model(kinematics="fixed-frame")),
+        "hub": scene_of("hub", held(0.1), LAYERS, POINTS, tissue=SWELLING),
+        "hub, guides": scene_of("hub", held(0.1), LAYERS, POINTS, tissue=SWELLING, support=GUIDES),
+    }.items()
+}

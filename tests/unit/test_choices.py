@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+
+from fem_needle import FiniteElementNeedle, SceneError, solve_static
+from fem_needle.choices import choose, choose_elements, first_time_step, mesh_error
+from fem_needle.exact import exact_static, natural_frequencies
+from fem_needle.scene import Layer, Sinusoid, TipLoad
+from tests.consistency.scenes import GEL, characteristic_modulus, held, moving, scene_of
+
+
+def chosen(scene):
+    return choose(scene, lambda count: FiniteElementNeedle(scene, elements=count))
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("number", [2.0, 12.0])
+def test_the_mesh_keeps_the_tip_within_the_tolerance(tolerance, number):
+    layers = (Layer(foundation_modulus=characteristic_modulus(number)),)
+    scene = scene_of("hub", held(0.1), layers, numerics={"tolerance": tolerance})
+    elements, estimate = choose_elements(scene, "static")
+    exact = exact_static(scene, 0.1).tip_deflection
+    error = abs(solve_static(FiniteElementNeedle(scene, elements=elements), depth=0.1).tip_deflection / exact - 1.0)
+    assert error < 0.5 * tolerance
+    assert estimate <= 0.1 * tolerance
+    assert error < 2.0 * estimate + 1e-9
+
+
+def test_more_accuracy_needs_more_elements():
+    layers = (Layer(foundation_modulus=characteristic_modulus(12.0)),)
+    scenes = [scene_of("hub", held(0.1), layers, numerics={"tolerance": tolerance}) for tolerance in (1e-2, 1e-4, 1e-6)]
+    counts = [choose_elements(scene, "static")[0] for scene in scenes]
+    assert counts == sorted(set(counts))
+
+
+def test_mesh_error_is_that_of_the_tip():
+    scene = scene_of("entry", held(0.1), GEL, numerics={"degree": 3})
+    plant = FiniteElementNeedle(scene, elements=2)
+    exact = exact_static(scene, 0.1).tip_deflection
+    true = abs(solve_static(plant, depth=0.1).tip_deflection / exact - 1.0)
+    assert mesh_error(scene, plant, 32) == pytest.approx(true, rel=1e-2)
+
+
+def test_an_analysis_that_was_asked_for_is_obeyed():
+    scene = scene_of("entry", moving(3.0, 0.05, 0.1), numerics={"analysis": "static"}, duration=None)
+    found = chosen(scene)
+    assert found.analysis == "static"
+    assert found.skipped[0].term == "inertia"
+    assert "asked for" in found.skipped[0].reason
+
+
+def test_output_steps():
+    scene = scene_of("entry", held(0.1), duration=4.0)
+    assert chosen(scene).output_step == 4.0 / 200
+    assert chosen(scene.with_value("numerics.output_step", 0.5)).output_step == 0.5
+    with pytest.raises(SceneError, match="longer than the run"):
+        chosen(scene.with_value("numerics.output_step", 5.0))
+
+
+def test_the_first_step_resolves_loads_and_the_longest_period():
+    plain = FiniteElementNeedle(scene_of("entry", held(0.1), GEL), elements=8)
+    period = 2 * np.pi / natural_frequencies(plain.scene, 0.1, 1)[0]
+    assert first_time_step(plain, "dynamic", 10.0) == pytest.approx(period / 16, rel=1e-4)
+    assert first_time_step(plain, "static", 10.0) == 10.0
+    loads = [TipLoad(force=Sinusoid(amplitude=0.1, frequency=3000.0))]
+    fast = FiniteElementNeedle(scene_of("entry", held(0.1), GEL, loads), elements=8)
+    assert first_time_step(fast, "dynamic", 10.0) == pytest.approx(1 / 3000 / 24)

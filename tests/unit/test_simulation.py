@@ -1,0 +1,153 @@
+import numpy as np
+import pytest
+
+from fem_needle import ComputationError, FiniteElementNeedle, run_scene, simulate
+from fem_needle.march import TimeGrid, output_times, time_grid
+from fem_needle.scene import Sinusoid, TipLoad
+from fem_needle.steppers import StaticStepper
+from tests.consistency.scenes import GEL, LAYERS, held, moving, profile, scene_of
+
+SHORT = scene_of("entry", moving(0.5, 0.04, 0.09), LAYERS, duration=0.1)
+
+
+def plant(scene=SHORT, elements=4):
+    return FiniteElementNeedle(scene, elements=elements)
+
+
+class Watcher:
+    """Remembers what it was told."""
+
+    def __init__(self, stop_at=None):
+        self.chosen, self.fractions, self.times, self.stop_at = [], [], [], stop_at
+
+    def begin(self, plant, choice):
+        self.chosen.append(choice)
+
+    def progress(self, fraction):
+        self.fractions.append(fraction)
+        if self.stop_at is not None and fraction >= self.stop_at:
+            raise KeyboardInterrupt
+
+    def sample(self, sample):
+        self.times.append(sample.time)
+
+
+@pytest.mark.parametrize(
+    ("duration", "step", "expected"),
+    [(1.0, 0.25, [0, 0.25, 0.5, 0.75, 1]), (1.0, 0.4, [0, 0.4, 0.8, 1]), (0.3, 0.1, [0, 0.1, 0.2, 0.3]), (1.0, 1.0, [0, 1])],
+)
+def test_output_times(duration, step, expected):
+    times = output_times(duration, step)
+    assert times == pytest.approx(expected)
+    assert times[-1] == duration
+
+
+def test_steps_land_on_outputs_and_kinks():
+    grid = TimeGrid(outputs=(0.0, 0.5, 1.0), landings=(0.3,), time_step=0.1)
+    assert list(grid.intervals()) == [(0.0, 0.3, 3), (0.3, 0.5, 2), (0.5, 1.0, 5)]
+    assert grid.steps == 10
+
+
+def test_an_output_beside_a_landing_is_moved_onto_it():
+    """50 mm is reached at 0.02 s up to round-off; no step of 1e-17 s."""
+    grid = time_grid(plant(), 1e-3, 0.01)
+    lengths = [end - start for start, end, _ in grid.intervals()]
+    assert min(lengths) > 1e-6
+
+
+@pytest.mark.parametrize("analysis", ["static", "quasi-static", "dynamic"])
+def test_samples_lie_at_the_output_times(analysis):
+    run = simulate(plant(), time_step=1e-3, analysis=analysis, output_step=0.03)
+    assert run.time == pytest.approx([0.0, 0.03, 0.06, 0.09, 0.1])
+    assert run.depth == pytest.approx(0.04 + 0.5 * run.time)
+    assert run.speed[:-1] == pytest.approx(np.full(4, 0.5))
+    assert run.summary["stop_reason"] == "duration"
+
+
+def test_a_run_is_repeated_to_the_last_digit():
+    one, other = (simulate(plant(), time_step=1e-3, analysis="dynamic", output_step=0.05) for _ in range(2))
+    for name in ("tip_deflection", "boundary_energy", "push_force"):
+        assert np.array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_a_plant_remembers_nothing():
+    """A run does not depend on what the plant did before."""
+    used = plant()
+    simulate(used, time_step=1e-3, analysis="dynamic", output_step=0.05)
+    again = simulate(used, time_step=1e-3, analysis="static", output_step=0.05)
+    fresh = simulate(plant(), time_step=1e-3, analysis="static", output_step=0.05)
+    assert np.array_equal(again.tip_deflection, fresh.tip_deflection)
+
+
+def test_observer():
+    watcher = Watcher()
+    run = simulate(plant(), time_step=1e-3, analysis="static", output_step=0.02, observer=watcher)
+    assert watcher.times == run.time.tolist()
+    assert watcher.fractions == sorted(watcher.fractions)
+    assert watcher.fractions[-1] == 1.0
+    assert watcher.chosen[0]["analysis"] == "static"
+    assert watcher.chosen[0]["output_times"] == tuple(run.time)
+
+
+@pytest.mark.parametrize("time_step", [1e-3, "auto"])
+def test_an_interrupt_keeps_what_was_computed(time_step):
+    watcher = Watcher(stop_at=0.5)
+    run = simulate(plant(), time_step=time_step, analysis="dynamic", output_step=0.01, observer=watcher)
+    assert run.summary["stop_reason"] == "interrupted"
+    assert 3 <= len(run.time) < 11
+    assert np.all(np.isfinite(run.tip_deflection))
+
+
+def test_a_failure_says_where_and_keeps_what_was_computed(monkeypatch):
+    calls = []
+    advance = StaticStepper.advance
+
+    def failing(self, law, start, until, last):
+        calls.append(until)
+        if until > 0.05:
+            raise np.linalg.LinAlgError("singular")
+        return advance(self, law, start, until, last)
+
+    monkeypatch.setattr(StaticStepper, "advance", failing)
+    with pytest.raises(ComputationError, match=r"at time 0\.05 s, depth 0\.065 m failed") as caught:
+        simulate(plant(), time_step=1e-2, analysis="static", output_step=0.01)
+    assert caught.value.partial.time[-1] == pytest.approx(0.05)
+
+
+def test_settings_of_run_scene_override_those_of_the_scene():
+    scene = SHORT.with_values({"numerics.elements": 9, "numerics.time_step": 1e-3})
+    run = run_scene(scene, elements=5, time_step=2e-3, analysis="static", output_step=0.02, degree=3)
+    assert {name: run.summary[name] for name in ("elements", "degree", "analysis")} == {
+        "elements": 5,
+        "degree": 3,
+        "analysis": "static",
+    }
+    assert run.summary["time_step"] == pytest.approx(2e-3)
+    assert run.scene.numerics.elements == 5
+
+
+def test_final_depth_is_the_reason_where_the_scene_ends_by_itself():
+    scene = scene_of("entry", moving(0.5, 0.04, 0.05), duration=None)
+    assert simulate(plant(scene), time_step=1e-3, analysis="static").summary["stop_reason"] == "final-depth"
+
+
+def test_a_tolerance_that_is_not_reached_is_told(monkeypatch):
+    monkeypatch.setattr("fem_needle.simulation.MOST_HALVINGS", 1)
+    scene = scene_of("entry", held(0.1), GEL, [TipLoad(force=Sinusoid(amplitude=0.1, frequency=40.0))], duration=0.02)
+    run = simulate(plant(scene), analysis="dynamic", output_step=0.01, time_step="auto", tolerance=1e-10)
+    assert len(run.summary["warnings"]) == 1
+    assert "was not reached" in run.summary["warnings"][0]
+
+
+def test_reversal_holds_and_reinsertion():
+    scene = scene_of("entry", profile([0.0, 0.02, 0.04, 0.06], [0.05, 0.06, 0.06, 0.05]), GEL, duration=0.06)
+    run = simulate(plant(scene), time_step=5e-4, analysis="static", output_step=0.01)
+    assert run.depth == pytest.approx([0.05, 0.055, 0.06, 0.06, 0.06, 0.055, 0.05])
+    assert run.tip_deflection[[0, 1, 2]] == pytest.approx(run.tip_deflection[[6, 5, 4]], rel=1e-10)
+
+
+def test_a_needle_without_tissue_or_loads_stays_where_it_is():
+    scene = scene_of("hub", moving(1.0, 0.05, 0.1), (), (), duration=0.05)
+    run = simulate(plant(scene), time_step=1e-3, analysis="dynamic")
+    assert not np.any(run.tip_deflection)
+    assert run.summary["relative_energy_residual"] == 0.0

@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from fem_needle import FiniteElementNeedle, banded, simulate
+from fem_needle.exact import natural_frequencies
+from fem_needle.free_response import natural_frequencies as computed_frequencies
+from fem_needle.free_response import ringing
+from fem_needle.scene import Guide, Initial, Insertion, Layer, Sinusoid, TipLoad
+from fem_needle.skipping import inertia_effect, inertia_free_stepper, shortest_period, unneeded_terms
+from fem_needle.steppers import DynamicStepper, StaticStepper
+from tests.consistency.scenes import DAMPED, GEL, held, moving, relative, scene_of
+
+
+@pytest.mark.parametrize("kind", ["entry", "hub"])
+def test_natural_frequencies(kind):
+    """sqrt((EI (beta / L)^4 + k) / rho A); the whole hub needle in tissue, half of the entry needle."""
+    scene = scene_of(kind, held(0.2), GEL)
+    found = computed_frequencies(FiniteElementNeedle(scene, elements=16), 0.2)[:4]
+    assert found == pytest.approx(natural_frequencies(scene, 0.2, 4), rel=1e-5)
+
+
+def test_rigid_and_very_stiff_guides_vibrate_alike():
+    found = []
+    for stiffness in ("rigid", 1e9):
+        scene = scene_of("hub", held(0.1), GEL, support={"guides": [Guide(position=-0.05, stiffness=stiffness)]})
+        found.append(computed_frequencies(FiniteElementNeedle(scene, elements=8), 0.1)[:3])
+    assert found[0] == pytest.approx(found[1], rel=1e-3)
+
+
+def test_ringing_of_one_mode():
+    """Velocities in the shape of the first mode: the tip rings with velocity over frequency."""
+    scene = scene_of("entry", held(0.1), GEL, ())
+    plant = FiniteElementNeedle(scene, elements=2)
+    run = scene.with_value("initial.shape", "straight")
+    frequency = natural_frequencies(run, 0.1, 1)[0]
+
+    operators = plant.operators(0.1, 0.0)
+    dense = [banded.to_dense(banded.trailing(band, 2)) for band in (operators.stiffness, operators.mass)]
+    mode = np.concatenate([np.zeros(2), eigh(*dense)[1][:, 0]])
+    tip = plant.points(0.1).rows[-1] @ mode
+    assert ringing(plant, 0.1, 0.0, mode) == pytest.approx(abs(tip) / frequency, rel=1e-2)
+
+
+def test_shortest_period():
+    assert shortest_period(scene_of("entry", held(0.1))) == float("inf")
+    loads = [TipLoad(force=Sinusoid(amplitude=0.1, frequency=4.0))]
+    insertion = Insertion(kind="profile", depth=Sinusoid(mean=0.1, amplitude=0.01, frequency=5.0))
+    assert shortest_period(scene_of("entry", insertion, loads=loads)) == 0.2
+
+
+def test_creep_where_the_tissue_is_viscous():
+    assert isinstance(inertia_free_stepper(FiniteElementNeedle(scene_of("entry", held(0.1)), elements=2)), StaticStepper)
+    damped = inertia_free_stepper(FiniteElementNeedle(scene_of("entry", held(0.1), DAMPED), elements=2))
+    assert isinstance(damped, DynamicStepper)
+    assert not damped.inertia
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.4])
+def test_the_bound_covers_what_inertia_does(speed):
+    scene = scene_of("entry", moving(speed, 0.06, 0.08), duration=0.02 / speed)
+    plant = FiniteElementNeedle(scene, elements=6)
+    both = [
+        simulate(plant, analysis=name, time_step=0.02 / speed / 400, output_step=0.002 / speed) for name in ("dynamic", "static")
+    ]
+    effect = relative(both[0].tip_deflection, both[1].tip_deflection)
+    bound = inertia_effect(plant)
+    assert effect <= bound
+    assert bound < 100.0 * effect
+
+
+def test_the_bound_covers_a_swinging_load():
+    scene = scene_of("entry", held(0.1), loads=[TipLoad(force=Sinusoid(mean=0.1, amplitude=0.05, frequency=5.0))], duration=0.2)
+    plant = FiniteElementNeedle(scene, elements=6)
+    both = [simulate(plant, analysis=name, time_step=2e-4, output_step=0.01) for name in ("dynamic", "static")]
+    assert relative(both[0].tip_deflection, both[1].tip_deflection) <= inertia_effect(plant) < 0.05
+
+
+def test_a_start_away_from_equilibrium_cannot_do_without_inertia():
+    scene = scene_of("entry", held(0.1), initial=Initial(shape="straight"))
+    assert inertia_effect(FiniteElementNeedle(scene, elements=4)) == float("inf")
+
+
+def test_unneeded_terms():
+    names = [skipped.term for skipped in unneeded_terms(scene_of("entry", held(0.1)))]
+    assert names == ["needle outside the tissue", "tissue viscosity", "swelling", "points between hub and tissue"]
+    full = scene_of(
+        "hub",
+        held(0.1),
+        [Layer(foundation_modulus=1e3, damping=1.0)],
+        support={"guides": [Guide(position=-0.01)]},
+        tissue={"stiffness_factor": Sinusoid(mean=1.0, amplitude=0.1, frequency=1.0)},
+    )
+    assert list(unneeded_terms(full)) == []
