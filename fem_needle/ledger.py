@@ -66,14 +66,15 @@ def form(band: Array | None, left: Array, right: Array) -> float:
     return 0.0 if band is None else float(left @ banded.multiply(band, right))
 
 
-def energies(stage: Stage, coordinates: Array, velocities: Array, forces: Array) -> Energies:
-    """Return the energies of a state; pass zero velocities and speed for a static one."""
+def energies(stage: Stage, solution: StageSolution, *, inertia: bool) -> Energies:
+    """Return the energies of a state; without inertia none is kinetic."""
     operators, speed = stage.operators, stage.instant.speed
-    kinetic = 0.5 * form(operators.mass, velocities, velocities)
-    if speed:
+    coordinates, velocities = solution.coordinates, solution.velocities
+    kinetic = 0.5 * form(operators.mass, velocities, velocities) if inertia else 0.0
+    if speed and inertia:
         kinetic += speed * form(operators.convection, velocities, coordinates)
         kinetic += 0.5 * speed**2 * form(operators.centrifugal, coordinates, coordinates)
-    return Energies(kinetic, *potential_energies(stage, coordinates, forces))
+    return Energies(kinetic, *potential_energies(stage, coordinates, solution.forces))
 
 
 def potential_energies(stage: Stage, coordinates: Array, forces: Array) -> tuple[float, float, float]:
@@ -257,6 +258,15 @@ def jump_works(before: StepEnd, after: StepEnd) -> Works:
     clamped = min(2, right.momentum.shape[0])
     hub = float(rates[:clamped] @ (right.momentum - left.momentum)[:clamped]) if np.any(rates) else 0.0
     return Works(hub_work=hub, boundary_energy=boundary)
+
+
+def force_jump_work(before: StepEnd, after: StepEnd) -> Works:
+    """Return the work at a jump of the loads that a needle without inertia follows at once: mean force times jump of deflection."""
+    left, right = before.solution, after.solution
+    points = after.stage.points
+    moved = points.deflections(right.coordinates, right.forces) - points.deflections(left.coordinates, left.forces)
+    mean = 0.5 * (left.forces + right.forces)
+    return Works(load_work=float(mean[points.guides :] @ moved[points.guides :]))
 
 
 def _hub_power(stage: Stage, solution: StageSolution, *, inertia: bool) -> float:

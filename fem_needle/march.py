@@ -13,7 +13,7 @@ from fem_needle import axial
 from fem_needle.banded import SingularMatrixError
 from fem_needle.errors import ComputationError
 from fem_needle.initial import initial_state
-from fem_needle.ledger import StepEnd, Works, energies, jump_works, row_correction, step_works
+from fem_needle.ledger import StepEnd, Works, energies, force_jump_work, jump_works, row_correction, step_works
 from fem_needle.motion import DepthLaw, depth_law, landing_times, run_duration
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample, sample_step
@@ -93,7 +93,7 @@ def march(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample, N
         If a step cannot be solved or gives numbers that are not finite; says at which time and depth.
     """
     law, inertia = depth_law(plant.scene), stepper.inertia
-    state, works, last = initial_state(plant, law), Works(), None
+    state, works, last = initial_state(stepper.plant, law), Works(), None
     landings, outputs = set(grid.landings) | {0.0}, set(grid.outputs)
     deepest = law.depth(0.0)
     for start, end, count in grid.intervals():
@@ -122,12 +122,11 @@ def _pass_landing(
     """Return the state just after a kink and what the kink did; a needle that leaves the tissue leaves its energy."""
     if law.depth(0.5 * (time + until)) < plant.smallest_depth:
         solution = before.solution
-        held = energies(before.stage, solution.coordinates, solution.velocities, solution.forces).total
+        held = energies(before.stage, solution, inertia=stepper.inertia).total
         dropped = trivial_solution(plant, before.stage)
         return StepEnd(before.stage, dropped), Works(boundary_energy=-held)
     after = stepper.start(law, time, until, before)
-    jumps = jump_works(before, after) if stepper.inertia else Works()
-    return after, jumps
+    return after, jump_works(before, after) if stepper.inertia else force_jump_work(before, after)
 
 
 def _advance(plant: Plant, stepper: Stepper, law: DepthLaw, state: StepEnd, until: float, last: Step | None) -> Step:

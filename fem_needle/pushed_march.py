@@ -87,7 +87,7 @@ def _initial_push_state(pusher: Pusher, grid: TimeGrid) -> PushState:
     plant = pusher.stepper.plant
     scene, depth = plant.scene, plant.scene.insertion.first_depth
     entered = axial.entered_layers(scene, depth)
-    state = PushState(initial_state(plant, depth_law(scene)), depth, 0.0, depth, entered, 0.0)
+    state = PushState(initial_state(pusher.stepper.plant, depth_law(scene)), depth, 0.0, depth, entered, 0.0)
     first, end, count = next(grid.intervals())
     trial = pusher.step(state, first + (end - first) / count, None, 0).lateral
     return replace(state, axial_force=pusher.axial_force(trial, at_start=True))
@@ -96,10 +96,16 @@ def _initial_push_state(pusher: Pusher, grid: TimeGrid) -> PushState:
 def _guarded(pusher: Pusher, run: _Run, until: float, limits: RunLimits) -> PushStep:
     state = run.state
     try:
-        direction = pusher.direction(state)
-        step = pusher.step(state, until, run.last, direction)
-        event = first_event(pusher, state, step, direction, _levels(pusher, state, limits))
-        return step if event is None else locate(pusher, state, until, direction, event)
+        direction, levels = pusher.direction(state), _levels(pusher, state, limits)
+        try:
+            step = pusher.step(state, until, run.last, direction)
+        except FloatingPointError:  # A jumps where the tip passes an interface: end the step there
+            event = levels.next(state.depth, direction)
+            if event is None:
+                raise
+            return locate(pusher, state, until, direction, ("reaches", event))
+        found = first_event(pusher, state, step, direction, levels)
+        return step if found is None else locate(pusher, state, until, direction, found)
     except (SingularMatrixError, np.linalg.LinAlgError, FloatingPointError) as error:
         raise ComputationError(
             f"the step at time {state.time:g} s, depth {state.depth:g} m failed: {error}; use a smaller time_step"

@@ -11,11 +11,10 @@ mass.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import copysign, inf, nextafter
+from math import copysign, inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from fem_needle import axial
 from fem_needle.collocation import Collocation
@@ -28,6 +27,7 @@ Array = NDArray[np.float64]
 
 MOST_ITERATIONS = 60
 SPEED_TOLERANCE = 1e-13  # of the largest speed of a step
+LAYER_SIDE = 1e-11  # of the depth: far enough from an interface to be in the layer that the tip moves in
 TIME_RESOLUTION = 1e-9  # of a step: how closely an event's time is found (the state lands on it exactly)
 
 
@@ -47,7 +47,7 @@ class StepMotion:
 
     def layer_depth(self, start: float, end: float) -> float:
         """Return a depth just ahead of the start: a step ends at an interface, also while it is being tried."""
-        return nextafter(self.start_depth, self.direction * inf) if self.direction else self.start_depth
+        return self.start_depth * (1 + self.direction * LAYER_SIDE)
 
     def depth(self, time: float) -> float:
         """Return z: the collocation polynomial, whose slope is the line through the nodes' speeds."""
@@ -165,7 +165,7 @@ class Pusher:
             speeds = found
             if change <= SPEED_TOLERANCE * np.max(np.abs(speeds)):
                 return self._slid(state, last, motion, forces)
-        raise FloatingPointError(f"the insertion speed does not converge {change} {speeds} {length} {state.time}")
+        raise FloatingPointError("the insertion speed does not converge")
 
     def _speeds(self, step: Step, state: PushState, direction: int) -> tuple[Array, _AxialForces]:
         """Return the speeds at start, nodes and end that the axial equations give on the lateral solution of a trial motion."""
@@ -182,7 +182,7 @@ class Pusher:
 
     def _forces(self, step: Step, state: PushState, direction: int) -> _AxialForces:
         constant, viscous = [], []
-        ahead = nextafter(state.depth, direction * inf)
+        ahead = state.depth * (1 + direction * LAYER_SIDE)
         cutting = axial.cutting_force(self.scene, ahead, float(direction), state.deepest)
         for stage, solution in zip(step.stages, step.solutions, strict=True):
             time, depth = stage.instant.time, stage.instant.depth
@@ -256,6 +256,11 @@ class Limits:
 
     levels: tuple[float, ...]
 
+    def next(self, depth: float, direction: int) -> float | None:
+        """Return the nearest level ahead, None without one or at rest."""
+        ahead = [level for level in self.levels if (level - depth) * direction > 0]
+        return min(ahead, key=lambda level: abs(level - depth)) if ahead else None
+
     def between(self, start: float, end: float) -> list[float]:
         """Return the levels strictly after the start and up to the end, nearest first."""
         if end >= start:
@@ -264,26 +269,42 @@ class Limits:
 
 
 def locate(pusher: Pusher, state: PushState, until: float, direction: int, event: tuple[str, float]) -> PushStep:
-    """Return the step that ends exactly at an event."""
+    """Return the step that ends exactly at an event, found by false position and bisection in time.
+
+    A trial that goes beyond an interface may not converge, because A jumps there: it counts as beyond.
+    """
     kind, level = event
 
-    def distance(time: float) -> float:
-        reached = pusher.step(state, time, None, direction).state
+    def tried(time: float) -> tuple[PushStep | None, float]:
+        try:
+            step = pusher.step(state, time, None, direction)
+        except FloatingPointError:
+            return None, inf
         if kind == "reaches":
-            return (reached.depth - level) * direction
-        if kind == "stops":
-            return reached.speed * direction
-        return _margin(pusher, reached)
+            return step, (step.state.depth - level) * direction
+        return step, -step.state.speed * direction if kind == "stops" else -_margin(pusher, step.state)
 
     length = until - state.time
-    earliest = state.time + 1e-6 * length
-    if distance(earliest) * distance(until) < 0:
-        until = brentq(distance, earliest, until, xtol=TIME_RESOLUTION * length, rtol=8.9e-16)
-    elif kind != "reaches":
-        until = earliest
-    step = pusher.step(state, until, None, direction)
-    landed = replace(step.state, depth=level) if kind == "reaches" else replace(step.state, speed=0.0)
-    return replace(step, state=landed, event=kind)
+    low, high = state.time, until
+    low_value, (found, high_value) = -inf, tried(until)
+    while high - low > TIME_RESOLUTION * length:
+        time = _between(low, high, low_value, high_value)
+        step, value = tried(time)
+        if value < 0:
+            low, low_value = time, value
+            found = step if high_value == inf else found
+        else:
+            high, high_value, found = time, value, step or found
+    if found is None:
+        raise FloatingPointError("the insertion speed does not converge")
+    landed = replace(found.state, depth=level) if kind == "reaches" else replace(found.state, speed=0.0)
+    return replace(found, state=landed, event=kind)
+
+
+def _between(low: float, high: float, low_value: float, high_value: float) -> float:
+    """Return where the line between two values crosses zero, kept inside; the middle where a value is missing."""
+    share = low_value / (low_value - high_value) if isfinite(low_value) and isfinite(high_value) else 0.5
+    return low + (high - low) * min(max(share, 0.05), 0.95)
 
 
 def _margin(pusher: Pusher, state: PushState) -> float:

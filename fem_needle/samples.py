@@ -64,7 +64,7 @@ def sample_step(plant: Plant, step: Step, works: Works, deepest: float, depth: f
     end = step.ends[0] if at_start else step.ends[1]
     stage, solution = end.stage, end.solution
     speed, acceleration = stage.instant.speed, stage.instant.acceleration
-    scene, energy = plant.scene, energies(stage, solution.coordinates, solution.velocities, solution.forces)
+    scene, energy = plant.scene, energies(stage, solution, inertia=inertia)
     mass = scene.needle.mass_per_length * scene.needle.length
     friction = axial.friction_force(scene, depth, speed)
     cutting = axial.cutting_force(scene, depth, speed, deepest)
@@ -78,7 +78,7 @@ def sample_step(plant: Plant, step: Step, works: Works, deepest: float, depth: f
         speed=speed,
         coordinates=solution.coordinates,
         point_forces=solution.forces,
-        guide_force=solution.forces[: stage.points.guides],
+        guide_force=_guide_forces(step, end),
         push_force=mass * acceleration + friction + cutting - axial_force,
         friction_force=friction,
         tissue_force=tissue,
@@ -122,6 +122,14 @@ def _reactions(
         tissue = tissue - stage.factor * stage.rest.load
     clamp = plant.clamp_reactions(np.asarray(needed), stage.instant.depth)
     return clamp, -float(plant.deflection_at_one @ tissue)
+
+
+def _guide_forces(step: Step, end: StepEnd) -> Array:
+    """Return the guides' forces: a rigid one's as the mean over the step, about which an index-3 multiplier alternates."""
+    points = end.stage.points
+    forces = end.solution.forces[: points.guides]
+    weighted = [w * s.forces[: points.guides] for w, s in zip(step.method.weights, step.solutions, strict=True)]
+    return np.where(points.guide_compliance > 0.0, forces, np.sum(weighted, axis=0)) if points.guides else forces
 
 
 def _axial_momenta(step: Step) -> list[float]:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import copysign
 
 from fem_needle.scene import Layer
+
+ROUNDINGS = 1e-12  # of a depth: what a landing on an interface may miss it by
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,17 @@ def inserted_segments(layers: Sequence[Layer], depth: float) -> tuple[Segment, .
         for index, layer in enumerate(layers)
         if depth > layer.start
     )
+
+
+def one_sided(layers: Sequence[Layer], depth: float, toward: float) -> float:
+    """Return the depth [m], moved off an interface by a few roundings toward the side that a step comes from or goes to.
+
+    Rates by depth jump there: a layer that begins or ends has none yet, or none any more, on the other side.
+    """
+    slack = ROUNDINGS * max(abs(depth), abs(toward))
+    if depth == toward or all(abs(depth - level) > slack for level in interfaces(layers)):
+        return depth
+    return depth + copysign(min(2 * slack, abs(toward - depth)), toward - depth)
 
 
 def tip_layer(layers: Sequence[Layer], depth: float) -> int | None:

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from fem_needle.collocation import Collocation, gauss
 from fem_needle.ledger import StepEnd, StepParts
 from fem_needle.loads import LoadCase, is_steady, load_case
-from fem_needle.motion import Motion
+from fem_needle.motion import Instant, Motion
 from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Plant
+from fem_needle.segments import one_sided
 from fem_needle.stages import (
     PathHistory,
     Stage,
@@ -35,6 +36,8 @@ from fem_needle.statics import static_state
 
 Array = NDArray[np.float64]
 
+SMALLEST_COMPLIANCE = 1e-9  # of the needle's own: a guide's kink below it is taken as at a node
+JUMP_FRACTION = 1e-9  # of a step: in this time viscosity lets nothing move
 MOST_PATH_ITERATIONS = 50
 PATH_TOLERANCE = 1e-13  # of the largest tip deflection of the step
 
@@ -88,12 +91,28 @@ class DynamicStepper:
     def start(self, law: Motion, time: float, until: float, before: StepEnd) -> StepEnd:
         """Carry coordinates and momentum over a possible jump of speed or of the hub's velocity."""
         middle = law.layer_depth(time, until)
-        stage = evaluate_stage(self.plant, law.after(time), self._loads(middle, time, before.stage), before.stage)
-        solution = before.solution
-        path = before.path
+        instant = self._one_sided(law.after(time), middle)
+        stage = evaluate_stage(self.plant, instant, self._loads(middle, time, before.stage), before.stage)
+        solution, guides, path = before.solution, stage.points.guides, before.path
         if path is not None:
             stage = with_path(self.plant, stage, path)
-        return self._state(stage, solution.coordinates, solution.momentum, solution.forces, path)
+        forces = np.concatenate([solution.forces[:guides], stage.case.forces])
+        after = self._state(stage, solution.coordinates, solution.momentum, forces, path)
+        if self.inertia or np.allclose(forces[guides:], solution.forces[guides:], rtol=1e-9, atol=0.0):
+            return after
+        return self._followed(after, until)
+
+    def _one_sided(self, instant: Instant, layer_depth: float) -> Instant:
+        layers = self.plant.scene.tissue.layers
+        return replace(instant, depth=one_sided(layers, instant.depth, layer_depth))
+
+    def _followed(self, start: StepEnd, until: float) -> StepEnd:
+        """Let a needle without inertia follow a jump of the loads: what no viscosity holds moves at once."""
+        instant = start.stage.instant
+        frozen = _Frozen(replace(instant, speed=0.0, acceleration=0.0))
+        length = JUMP_FRACTION * (until - instant.time)
+        step = self._attempt(frozen, start, instant.time + length, None, None)
+        return StepEnd(start.stage, step.ends[1].solution, start.path)
 
     def advance(self, law: Motion, start: StepEnd, until: float, last: Step | None) -> Step:
         """Solve the stages and extrapolate their polynomial to the end.
@@ -124,7 +143,7 @@ class DynamicStepper:
         end_momentum = self._extrapolated(begin.momentum, [state.momentum for state in solutions])
         case = self._loads(middle, nextafter(until, time), stages[1])
         end_coordinates[: self.plant.prescribed] = case.clamp[: self.plant.prescribed]
-        stage = evaluate_stage(self.plant, law.before(until), case, stages[1])
+        stage = evaluate_stage(self.plant, self._one_sided(law.before(until), middle), case, stages[1])
         path = start.path
         if path is not None and cut is not None:
             depths, (history, tips) = [*(s.instant.depth for s in stages), stage.instant.depth], cut
@@ -167,20 +186,30 @@ class DynamicStepper:
         return load_case(self.plant.scene, depth, time)
 
     def _end_reactions(self, stage: Stage, coordinates: Array, solutions: tuple[StageSolution, ...]) -> Array:
-        """Return the guides' forces at the end of a step: springs from their deflection there.
+        """Return the guides' forces at the end of a step from the deflections there.
 
-        A rigid guide's is the mean over the step: the values at the nodes alternate about it (an index-3 multiplier).
+        N q + B P + compliance R = 0 for all guides together, except those rigid ones at a node, whose B vanishes: the mean over
+        the step, about which the values at the nodes alternate (an index-3 multiplier).
         """
-        points = stage.points
-        guides = points.guides
-        mean = sum(w * s.forces[:guides] for w, s in zip(self.method.weights, solutions, strict=True))
-        forces = np.concatenate([np.asarray(mean), stage.case.forces])
-        for index in range(guides):
-            compliance = points.guide_compliance[index] + points.flexibility[index, index]
-            if points.guide_compliance[index] > 0.0:
-                others = float(points.flexibility[index] @ forces) - points.flexibility[index, index] * forces[index]
-                forces[index] = -(float(points.rows[index] @ coordinates) + others) / compliance
+        points, guides = stage.points, stage.points.guides
+        if not guides:
+            return np.zeros(0)
+        weighted = [w * s.forces[:guides] for w, s in zip(self.method.weights, solutions, strict=True)]
+        forces = np.concatenate([np.sum(weighted, axis=0), stage.case.forces])
+        compliance = points.flexibility[:guides, :guides] + np.diag(points.guide_compliance)
+        # Beside the compliance of the whole needle seen from the guide, which B cannot exceed.
+        soft = np.flatnonzero(np.diag(compliance) > SMALLEST_COMPLIANCE * self.compliance_scale)
+        if len(soft):
+            others = np.delete(np.arange(len(forces)), soft)
+            gap = points.rows[soft] @ coordinates + points.flexibility[np.ix_(soft, others)] @ forces[others]
+            forces[soft] = np.linalg.solve(compliance[np.ix_(soft, soft)], -gap)
         return forces[:guides]
+
+    @property
+    def compliance_scale(self) -> float:
+        """Return l^3 / (48 EI) [m/N], the compliance of the needle on two supports."""
+        needle = self.plant.scene.needle
+        return needle.length**3 / (48 * needle.bending_stiffness)
 
     def _stages(
         self, law: Motion, start: StepEnd, until: float, last: Step | None, cut: _Cut | None
@@ -189,7 +218,7 @@ class DynamicStepper:
         length, middle, latest = until - time, law.layer_depth(time, until), nextafter(until, time)
         found: list[Stage] = []
         for number, node in enumerate(self.method.nodes):
-            instant = law.before(until) if node == 1.0 else law.after(time + node * length)
+            instant = self._one_sided(law.before(until), middle) if node == 1.0 else law.after(time + node * length)
             if last is not None and last.stages[number].instant.depth == instant.depth:
                 earlier = last.stages[number]
             # A node at the end belongs to this step: loads and layers just before a kink.
@@ -225,6 +254,29 @@ def _reusable(last: Step | None, stages: tuple[Stage, Stage], length: float) -> 
         for new, old in zip(stages, last.stages, strict=True)
     )
     return last.system if same else None
+
+
+@dataclass(frozen=True)
+class _Frozen:
+    """A needle held at one instant."""
+
+    instant: Instant
+
+    def layer_depth(self, start: float, end: float) -> float:
+        """Return the depth [m]."""
+        return self.instant.depth
+
+    def depth(self, time: float) -> float:
+        """Return the depth [m]."""
+        return self.instant.depth
+
+    def after(self, time: float) -> Instant:
+        """Return the instant."""
+        return self.instant
+
+    def before(self, time: float) -> Instant:
+        """Return the instant."""
+        return self.instant
 
 
 class Massless:
