@@ -261,7 +261,7 @@ def jump_works(before: StepEnd, after: StepEnd) -> Works:
 
 
 def force_jump_work(before: StepEnd, after: StepEnd) -> Works:
-    """Return the work at a jump of the loads that a needle without inertia follows at once: mean force times jump of deflection."""
+    """Return the work at a jump of the loads that a needle without inertia follows at once: mean force x jump of deflection."""
     left, right = before.solution, after.solution
     points = after.stage.points
     moved = points.deflections(right.coordinates, right.forces) - points.deflections(left.coordinates, left.forces)

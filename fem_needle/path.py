@@ -63,6 +63,15 @@ class CutPath:
         edges, pieces = np.append(self.edges, start + span), np.vstack([self.coefficients, piece])
         return CutPath(edges, pieces, deflections[-1])
 
+    def points(self) -> tuple[Array, Array]:
+        """Return y [m] and r [m] at the jump (both sides) and at the end of every piece; empty before anything is cut."""
+        if not len(self.coefficients):
+            return np.zeros(0), np.zeros(0)
+        spans = np.diff(self.edges)[:, None] ** np.arange(4)
+        ends = np.sum(self.coefficients * spans, axis=1)
+        y = np.concatenate([self.edges[:1], self.edges])
+        return y, np.concatenate([[0.0, self.coefficients[0, 0]], ends])
+
     def seen_from(self, depth: float, tip_deflection: float) -> CutPath:
         """Return the path with the front of a tip that stands at a depth inside the last piece or beyond."""
         return replace(self, front=tip_deflection) if depth >= self.deepest else self

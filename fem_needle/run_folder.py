@@ -245,6 +245,8 @@ def load_run(folder: Path) -> Trajectory:
         time=values["time"],
         series={name: values[name] for name in VARIABLES},
         guide_force=values["guide_force"],
+        path_position=values.get("path_position", np.zeros(0)),
+        path_deflection=values.get("path_deflection", np.zeros(0)),
         arc_length=values["arc_length"],
         station_deflection=values["deflection"],
         summary=summary | {"folder": str(folder.resolve())},

@@ -49,6 +49,8 @@ class Sample:
     push_work: float
     arrest_loss: float
     axial_kinetic_energy: float
+    path_position: Array
+    path_deflection: Array
 
     @property
     def lateral_energy(self) -> float:
@@ -72,6 +74,8 @@ def sample_step(plant: Plant, step: Step, works: Works, deepest: float, depth: f
     if inertia:
         axial_force -= _rate(step, _axial_momenta(step), at_start=at_start)
     (hub_force, hub_moment), tissue = _reactions(plant, step, end, at_start=at_start, inertia=inertia)
+    no_path = (np.zeros(0), np.zeros(0))
+    path_position, path_deflection = no_path if end.path is None else end.path.points()
     return Sample(
         time=stage.instant.time,
         depth=depth,
@@ -98,6 +102,8 @@ def sample_step(plant: Plant, step: Step, works: Works, deepest: float, depth: f
         push_work=works.push_work,
         arrest_loss=works.arrest_loss,
         axial_kinetic_energy=0.5 * mass * speed**2,
+        path_position=path_position,
+        path_deflection=path_deflection,
     )
 
 

@@ -53,6 +53,10 @@ class Stepper(Protocol):
     """Advance a state over one smooth step."""
 
     @property
+    def plant(self) -> Plant:
+        """The model as it is stepped, without inertia where that is left out."""
+
+    @property
     def inertia(self) -> bool:
         """Whether the needle's inertia acts."""
 

@@ -59,10 +59,12 @@ class TissueBlock:
         result[:, 1] = np.outer(needle, self.kernel).ravel()
         return result
 
-    def file(self, positions: Array, deflection: Array) -> bytes:
-        """Return the ``.vtu`` of one frame."""
-        moved = self.displacement(positions, deflection)
-        return self.before + point_data({"displacement_illustrative": moved}) + self.after
+    def file(self, positions: Array, deflection: Array, path: Array | None = None) -> bytes:
+        """Return the ``.vtu`` of one frame; ``path`` is the rest line at every plane [m], where the tip cuts one."""
+        arrays = {"displacement_illustrative": self.displacement(positions, deflection)}
+        if path is not None:
+            arrays["cut_path"] = np.repeat(path, len(self.kernel)).astype(np.float32)
+        return self.before + point_data(arrays) + self.after
 
 
 def tissue_block(scene: Scene, deepest: float) -> TissueBlock | None:

@@ -13,7 +13,8 @@ from scipy.interpolate import CubicSpline
 
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample
-from fem_needle.scene import Scene
+from fem_needle.scene import Scene, as_function
+from fem_needle.time_integrals import twice_integrated
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,7 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "speed": ("m/s", "insertion speed, positive going in"),
     "tip_deflection": ("m", "lateral displacement of the tip"),
     "tip_angle": ("rad", "slope of the needle at the tip"),
+    "hub_angle": ("rad", "angle of the hub"),
     "push_force": ("N", "axial force that the insertion needs, positive going in"),
     "friction_force": ("N", "axial friction of the shaft, against the motion; 0 at rest"),
     "tissue_force": ("N", "total lateral force of the tissue on the needle"),
@@ -49,7 +51,7 @@ VARIABLES: dict[str, tuple[str, str]] = {
 _FROM_SAMPLES = tuple(
     name
     for name in VARIABLES
-    if name not in {"tip_deflection", "tip_angle", "energy_residual", "axial_energy_residual"}
+    if name not in {"tip_deflection", "tip_angle", "hub_angle", "energy_residual", "axial_energy_residual"}
 )
 
 
@@ -73,6 +75,8 @@ class Trajectory:
         Stations from the hub, 0, to the tip, l [m], shape (n,).
     station_deflection
         Deflection at the stations [m], shape (nt, n).
+    path_position, path_deflection
+        Where the tip has cut: y [m] and rest line r [m] at the end of the run, shape (points,); empty without a cut path.
     summary
         What ``summary.json`` holds.
     plant, coordinates, point_forces
@@ -85,6 +89,8 @@ class Trajectory:
     guide_force: Array
     arc_length: Array
     station_deflection: Array
+    path_position: Array = field(default_factory=lambda: np.zeros(0))
+    path_deflection: Array = field(default_factory=lambda: np.zeros(0))
     summary: dict[str, Any] = field(default_factory=dict)
     plant: Plant | None = None
     coordinates: Array | None = None
@@ -155,6 +161,7 @@ def trajectory_from_samples(
     tip = np.array([length])
     series["tip_deflection"] = shapes[:, -1].copy()
     series["tip_angle"] = np.array([plant.deflection(s.coordinates, s.point_forces, s.depth, tip, 1)[0] for s in samples])
+    series["hub_angle"] = _hub_angles(plant, samples)
     energy = np.array([s.lateral_energy for s in samples])
     gained = series["load_work"] + series["hub_work"] + series["tissue_work"] + series["boundary_energy"]
     series["energy_residual"] = energy - energy[0] - (gained - series["tissue_dissipation"])
@@ -170,11 +177,24 @@ def trajectory_from_samples(
         guide_force=np.stack([s.guide_force for s in samples]),
         arc_length=stations,
         station_deflection=shapes,
+        path_position=samples[-1].path_position,
+        path_deflection=samples[-1].path_deflection,
         summary=summary,
         plant=plant,
         coordinates=np.stack([s.coordinates for s in samples]),
         point_forces=np.stack([s.point_forces for s in samples]),
     )
+
+
+def _hub_angles(plant: Plant, samples: Sequence[Sample]) -> Array:
+    """Return the hub's angle [rad]: of the bent needle, or under ``entry`` of a free hub that its torque alone turns."""
+    support = plant.scene.support
+    if support.kind == "hub":
+        hub = np.zeros(1)
+        return np.array([plant.deflection(s.coordinates, s.point_forces, s.depth, hub, 1)[0] for s in samples])
+    if support.hub_rotational_inertia is None:
+        return np.zeros(len(samples))
+    return twice_integrated(as_function(support.hub_torque), [s.time for s in samples]) / support.hub_rotational_inertia
 
 
 def summary_of(run: Trajectory) -> dict[str, Any]:

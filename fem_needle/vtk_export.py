@@ -39,6 +39,8 @@ class Frame:
         [s], [m].
     deflection, curvature, third_derivative
         w [m], w'' [1/m], w''' [1/m^2] at the stations, shape (n,).
+    path_position, path_deflection
+        The path cut so far, y and r [m]; empty without one.
     """
 
     time: float
@@ -46,6 +48,14 @@ class Frame:
     deflection: Array
     curvature: Array
     third_derivative: Array
+    path_position: Array
+    path_deflection: Array
+
+    def rest_line(self, positions: Array) -> Array:
+        """Return where the tissue's springs rest [m] at positions y [m]: on the path cut so far, else on the axis."""
+        if not len(self.path_position):
+            return np.zeros(positions.shape)
+        return np.interp(positions, self.path_position, self.path_deflection, left=0.0, right=0.0)
 
 
 def frame_of_sample(plant: Plant, sample: Sample, arc_length: Array) -> Frame:
@@ -54,7 +64,8 @@ def frame_of_sample(plant: Plant, sample: Sample, arc_length: Array) -> Frame:
         plant.deflection(sample.coordinates, sample.point_forces, sample.depth, arc_length, derivative)
         for derivative in (0, 2, 3)
     ]
-    return Frame(sample.time, sample.depth, *values)
+    shape = (values[0], values[1], values[2])
+    return Frame(sample.time, sample.depth, *shape, sample.path_position, sample.path_deflection)
 
 
 def frames_of_run(run: Trajectory, first: int = 0) -> list[Frame]:
@@ -62,11 +73,13 @@ def frames_of_run(run: Trajectory, first: int = 0) -> list[Frame]:
     if first >= len(run.time):
         return []
     curvature, third = run.deflection(derivative=2), run.deflection(derivative=3)
-    rows = range(first, len(run.time))
-    return [
-        Frame(float(run.time[row]), float(run.depth[row]), run.station_deflection[row], curvature[row], third[row])
-        for row in rows
-    ]
+    frames = []
+    for row in range(first, len(run.time)):
+        cut = run.path_position <= np.max(run.depth[: row + 1])
+        path = (run.path_position[cut], run.path_deflection[cut])
+        shape = (run.station_deflection[row], curvature[row], third[row])
+        frames.append(Frame(float(run.time[row]), float(run.depth[row]), *shape, *path))
+    return frames
 
 
 def needle_positions(scene: Scene, depth: float, arc_length: Array) -> Array:
@@ -78,10 +91,11 @@ def needle_arrays(scene: Scene, frame: Frame, arc_length: Array) -> dict[str, ND
     """Return the arrays on the needle's points.
 
     ``deflection`` (0, w, 0) [m]; ``bending_moment`` EI w'' [N m]; ``shear_force`` EI w''' [N], minus the force along y that the
-    part towards the tip exerts on the part towards the hub (a tip force F gives -F at the tip); ``tissue_reaction`` -k m(t) w
-    [N/m], the springs' force on the needle, without the viscous part; ``layer`` [1], -1 outside; ``radius`` [m].
+    part towards the tip exerts on the part towards the hub (a tip force F gives -F at the tip); ``tissue_reaction``
+    -k m(t) (w - r) [N/m], the springs' force on the needle, without the viscous part; ``layer`` [1], -1 outside; ``radius`` [m].
     """
-    layer = layers_at(scene, needle_positions(scene, frame.depth, arc_length))
+    positions = needle_positions(scene, frame.depth, arc_length)
+    layer = layers_at(scene, positions)
     moduli = np.array([item.foundation_modulus for item in scene.tissue.layers] + [0.0])
     modulus = moduli[layer] * as_function(scene.tissue.stiffness_factor).value(frame.time)
     stiffness, radius = scene.needle.bending_stiffness, scene.needle.radius
@@ -89,7 +103,7 @@ def needle_arrays(scene: Scene, frame: Frame, arc_length: Array) -> dict[str, ND
         "deflection": _along_y(frame.deflection),
         "bending_moment": stiffness * frame.curvature,
         "shear_force": stiffness * frame.third_derivative,
-        "tissue_reaction": -modulus * frame.deflection,
+        "tissue_reaction": -modulus * (frame.deflection - frame.rest_line(positions)),
         "layer": layer,
         "radius": np.full(arc_length.shape, DRAWN_RADIUS * scene.needle.length if radius is None else radius),
     }
@@ -101,6 +115,13 @@ def layers_at(scene: Scene, positions: Array) -> NDArray[np.int32]:
     for index, layer in enumerate(scene.tissue.layers):
         found[(positions >= layer.start) & (positions < layer.far_side)] = index
     return found
+
+
+def _deepest(scene: Scene) -> float:
+    """Return the largest depth that a run may reach [m]."""
+    if scene.insertion.kind == "force":
+        return scene.insertion.final_depth or scene.needle.length
+    return scene.insertion.depth_range(scene.duration)[1]
 
 
 def _along_y(values: Array) -> Array:
@@ -124,7 +145,7 @@ class VtkSeries:
 
     def __init__(self, folder: Path, scene: Scene, arc_length: Array) -> None:
         self._folder, self._scene, self._arc_length = folder, scene, arc_length
-        self._block: TissueBlock | None = tissue_block(scene, scene.insertion.depth_range(scene.duration)[1])
+        self._block: TissueBlock | None = tissue_block(scene, _deepest(scene))
         self._entries: list[str] = []  # of the list, one for each frame
         self._listed = 0
         for name in (NEEDLE, TISSUE) if self._block else (NEEDLE,):
@@ -176,7 +197,8 @@ class VtkSeries:
         points = np.column_stack((x, np.zeros((x.size, 2))))
         contents = [polyline_file(points, needle_arrays(self._scene, frame, self._arc_length))]
         if self._block is not None:
-            contents.append(self._block.file(x, frame.deflection))
+            path = frame.rest_line(self._block.planes) if self._scene.tissue.rest_line == "cut-path" else None
+            contents.append(self._block.file(x, frame.deflection - frame.rest_line(x), path))
         return contents
 
     def _files(self, index: int) -> list[str]:

@@ -75,14 +75,14 @@ class LineMesh:
     def weighted_sum(self, positions: Array, weights: Array, derivative: int = 0) -> Array:
         """Return the sum over positions of weight times shape, or derivative of it, for every coordinate (size,)."""
         columns, shapes = self._shapes_at(positions, derivative)
-        return np.bincount(columns.ravel(), (shapes * weights).ravel(), minlength=self.size)
+        return np.asarray(np.bincount(columns.ravel(), (shapes * weights).ravel(), minlength=self.size), dtype=float)
 
     def evaluate(self, coordinates: Array, positions: Array, derivative: int = 0) -> Array:
         """Return values (..., positions) of functions with coordinates (..., size), or of a derivative."""
         columns, shapes = self._shapes_at(positions, derivative)
         return np.einsum("...ij,ij->...j", coordinates[..., columns], shapes)
 
-    def _shapes_at(self, positions: Array, derivative: int) -> tuple[NDArray[np.intp], Array]:
+    def _shapes_at(self, positions: Array, derivative: int) -> tuple[NDArray[np.int64], Array]:
         """Return the coordinates (count, positions) that act at each position, and their shapes there."""
         where = np.searchsorted(self.nodes, positions, side="right") - 1
         where = np.clip(where, 0, self.elements - 1)
@@ -90,7 +90,7 @@ class LineMesh:
         place = np.clip((positions - self.nodes[where]) / size, 0.0, 1.0)
         shapes = self.reference.unit_shapes(place, derivative) * self.scales[where].T / size**derivative
         columns = self.reference.stride * where + np.arange(self.reference.count)[:, None]
-        return np.asarray(columns, dtype=np.intp), shapes
+        return np.asarray(columns, dtype=np.int64), shapes
 
 
 def uniform_mesh(length: float, elements: int, degree: int) -> LineMesh:
