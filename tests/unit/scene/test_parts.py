@@ -108,13 +108,6 @@ def test_a_message_has_name_value_unit_and_range():
 @pytest.mark.parametrize(
     ("part", "keys"),
     [
-        (Insertion, {"kind": "force", "initial_depth": 0.1}),
-        (Insertion, {"kind": "hold", "initial_depth": 0.1, "push_force": 1.0}),
-        (Layer, {"foundation_modulus": 1.0, "puncture_force": 1.0}),
-        (Tissue, {"rest_line": "cut-path"}),
-        (Tissue, {"kind": "tip-spring"}),
-        (Tissue, {"tip_stiffness": 1.0}),
-        (Support, {"kind": "hub", "hub_rotation": "fixed"}),
         (Model, {"kind": "assumed-modes"}),
         (Model, {"modes": 2}),
         (Numerics, {"mesh": "file"}),
