@@ -77,7 +77,7 @@ def _layers(scene: Scene) -> Iterator[str]:
 
 
 def _push(scene: Scene) -> Iterator[str]:
-    """Compare the push that the insertion needs with the Euler load of the free part.
+    """Compare the push, given or needed, with the Euler load of the free part.
 
     The free part is taken as clamped at the hub and free at the skin:
     P = pi^2 EI / (2 L)^2 [N].
@@ -87,13 +87,15 @@ def _push(scene: Scene) -> Iterator[str]:
     euler = pi**2 * scene.needle.bending_stiffness / (2.0 * free) ** 2 if free > 0.0 else inf
     if push > euler:
         yield (
-            f"the push that the insertion needs, {push:.3g} N > {euler:.3g} N, "
+            f"the push, {push:.3g} N > {euler:.3g} N, "
             f"the Euler load pi^2 EI / (2 L)^2 of the free part (L = {free:g} m): the needle may buckle"
         )
 
 
 def _needed_push(scene: Scene) -> float:
-    """Return friction and largest cutting force at the first depth and the largest speed [N]."""
+    """Return the largest push, or the friction and cutting force that a prescribed motion has to overcome [N]."""
+    if scene.insertion.push_force is not None:
+        return _largest(scene.insertion.push_force)
     friction, depth = scene.friction, scene.insertion.first_depth
     speed = 0.0 if scene.insertion.speed is None else _largest(scene.insertion.speed)
     coulomb = friction.coulomb + friction.coulomb_per_length * depth
@@ -138,6 +140,8 @@ def _times(scene: Scene) -> Iterator[str]:
     duration = scene.duration
     for name in ("time_step", "output_step"):
         step = getattr(scene.numerics, name)
+        if not duration:
+            continue  # a push ends by itself
         if isinstance(step, float) and step > duration:
             yield f"numerics.{name} = {step:g} s > {duration:g} s, the duration of the run"
         elif isinstance(step, float) and step < 1e-9 * duration:
