@@ -20,6 +20,7 @@ from fem_needle import axial
 from fem_needle.collocation import Collocation
 from fem_needle.ledger import StepEnd, Works, axial_momentum, configuration_force
 from fem_needle.motion import Instant
+from fem_needle.samples import axial_force_at
 from fem_needle.scene import Scene, as_function
 from fem_needle.steppers import DynamicStepper, Step
 
@@ -215,15 +216,7 @@ class Pusher:
 
     def axial_force(self, step: Step, *, at_start: bool = False) -> float:
         """Return A [N] at the end, or the start, of a step."""
-        end = step.ends[0] if at_start else step.ends[1]
-        inertia = self.stepper.inertia
-        force = configuration_force(self.stepper.plant, end.stage, end.solution, inertia=inertia)
-        if not inertia:
-            return force
-        first = _momentum(step.ends[0], inertia)
-        changes = [_momentum(StepEnd(s, q), inertia) - first for s, q in zip(step.stages, step.solutions, strict=True)]
-        slopes = step.method.start_slope if at_start else step.method.end_slope
-        return force - float(slopes @ np.array(changes)) / step.length
+        return axial_force_at(self.stepper.plant, step, at_start=at_start, inertia=self.stepper.inertia)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -58,53 +58,51 @@ class Sample:
         return self.kinetic_energy + self.bending_energy + self.tissue_energy
 
 
-def sample_step(plant: Plant, step: Step, works: Works, deepest: float, depth: float, *, at_start: bool, inertia: bool) -> Sample:
+def sample_step(
+    plant: Plant, step: Step, works: Works, deepest: float, depth: float, *, at_start: bool, inertia: bool
+) -> Sample:
     """Return the sample at the end of a step, or at the start of the first one.
 
     Rates of momentum come from the step's own polynomial; its error is of second order in the step.
     """
     end = step.ends[0] if at_start else step.ends[1]
-    stage, solution = end.stage, end.solution
-    speed, acceleration = stage.instant.speed, stage.instant.acceleration
-    scene, energy = plant.scene, energies(stage, solution, inertia=inertia)
+    instant, solution, scene = end.stage.instant, end.solution, plant.scene
     mass = scene.needle.mass_per_length * scene.needle.length
-    friction = axial.friction_force(scene, depth, speed)
-    cutting = axial.cutting_force(scene, depth, speed, deepest)
-    axial_force = configuration_force(plant, stage, solution, inertia=inertia)
-    if inertia:
-        axial_force -= _rate(step, _axial_momenta(step), at_start=at_start)
+    friction = axial.friction_force(scene, depth, instant.speed)
+    resisting = friction + axial.cutting_force(scene, depth, instant.speed, deepest)
+    axial_force = axial_force_at(plant, step, at_start=at_start, inertia=inertia)
     (hub_force, hub_moment), tissue = _reactions(plant, step, end, at_start=at_start, inertia=inertia)
-    no_path = (np.zeros(0), np.zeros(0))
-    path_position, path_deflection = no_path if end.path is None else end.path.points()
+    path_position, path_deflection = (np.zeros(0), np.zeros(0)) if end.path is None else end.path.points()
     return Sample(
-        time=stage.instant.time,
+        time=instant.time,
         depth=depth,
-        speed=speed,
+        speed=instant.speed,
         coordinates=solution.coordinates,
         point_forces=solution.forces,
         guide_force=_guide_forces(step, end),
-        push_force=mass * acceleration + friction + cutting - axial_force,
+        push_force=mass * instant.acceleration + resisting - axial_force,
         friction_force=friction,
         tissue_force=tissue,
         hub_force=hub_force,
         hub_moment=hub_moment,
-        kinetic_energy=energy.kinetic,
-        bending_energy=energy.bending,
-        tissue_energy=energy.tissue,
-        guide_energy=energy.guide,
-        load_work=works.load_work,
-        hub_work=works.hub_work,
-        tissue_work=works.tissue_work,
-        tissue_dissipation=works.tissue_dissipation,
-        boundary_energy=works.boundary_energy,
-        friction_dissipation=works.friction_dissipation,
-        cutting_work=works.cutting_work,
-        push_work=works.push_work,
-        arrest_loss=works.arrest_loss,
-        axial_kinetic_energy=0.5 * mass * speed**2,
+        axial_kinetic_energy=0.5 * mass * instant.speed**2,
         path_position=path_position,
         path_deflection=path_deflection,
+        **_ledger_values(end, works, inertia=inertia),
     )
+
+
+def axial_force_at(plant: Plant, step: Step, *, at_start: bool, inertia: bool) -> float:
+    """Return the axial force A [N] at the end, or the start, of a step."""
+    end = step.ends[0] if at_start else step.ends[1]
+    force = configuration_force(plant, end.stage, end.solution, inertia=inertia)
+    return force - float(_rate(step, _axial_momenta(step), at_start=at_start)) if inertia else force
+
+
+def _ledger_values(end: StepEnd, works: Works, *, inertia: bool) -> dict[str, float]:
+    energy = energies(end.stage, end.solution, inertia=inertia)
+    held = {f"{field.name}_energy": getattr(energy, field.name) for field in fields(energy)}
+    return held | {field.name: float(getattr(works, field.name)) for field in fields(works)}
 
 
 def _reactions(
