@@ -146,7 +146,7 @@ class DepthLaw:
 
 def depth_law(scene: Scene) -> DepthLaw:
     """Return the depth law of a position-driven scene."""
-    rests = scene.insertion.end_time if scene.insertion.final_depth is not None else None
+    rests = scene.insertion.rest_time
     return DepthLaw(scene, inf if rests is None else rests)
 
 

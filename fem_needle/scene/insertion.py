@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
+from math import inf
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -37,7 +39,7 @@ class Insertion(Part):
     speed
         [m/s], positive going in; a plain number needs a final depth.
     final_depth
-        z where the needle rests [m], with a plain speed; where the run ends, with a push.
+        z where the needle rests [m], once a speed has brought it there; where the run ends, with a push.
     depth
         z(t) [m] of a profile.
     push_force
@@ -71,9 +73,9 @@ class Insertion(Part):
 
     def _value_mistakes(self) -> Iterator[Mistake]:
         if isinstance(self.speed, Table | Sinusoid):
-            if self.final_depth is not None:
-                message = "belongs to a plain speed; the depth is the integral of the speed (allowed none)"
-                yield Mistake("final_depth", message, self.final_depth)
+            if self.final_depth is not None and self.rest_time is None:
+                limits = f"got {self.final_depth:g}; allowed what the integral of the speed reaches, m"
+                yield Mistake("final_depth", f"is never reached ({limits})", self.final_depth)
         elif self.speed is not None:
             yield from self._final_depth_mistakes(self.speed)
         if self.depth is not None and self.initial_depth is not None:
@@ -101,10 +103,20 @@ class Insertion(Part):
         return self.initial_depth or 0.0
 
     @property
+    def rest_time(self) -> float | None:
+        """When a prescribed speed has brought the needle to its final depth, where it rests [s]; None if it never does."""
+        if self.kind != "speed" or self.final_depth is None:
+            return None
+        way = self.final_depth - self.first_depth
+        if isinstance(self.speed, Table | Sinusoid):
+            return _time_of_integral(self.speed, way)
+        return way / self.speed if self.speed else None
+
+    @property
     def end_time(self) -> float | None:
         """When the insertion ends [s]; None if it never does."""
-        if self.kind == "speed" and self.final_depth is not None and isinstance(self.speed, float):
-            return (self.final_depth - self.first_depth) / self.speed
+        if self.rest_time is not None:
+            return self.rest_time
         moving = self.speed if self.kind == "speed" else self.depth
         return moving.time[-1] if isinstance(moving, Table) and moving.time[-1] > 0.0 else None
 
@@ -119,6 +131,7 @@ class Insertion(Part):
         first = self.first_depth
         moving = self.speed if self.kind == "speed" else self.depth
         if isinstance(moving, Table | Sinusoid):
+            duration = min(duration, inf if self.rest_time is None else self.rest_time)
             inner = moving.zeros(duration) if self.kind == "speed" else moving.turning_points(duration)
             times = np.concatenate(([0.0, duration], inner))
             return first + moving.integral(times) if self.kind == "speed" else moving.value(times)
@@ -126,3 +139,31 @@ class Insertion(Part):
             share = min(1.0, duration / (self.end_time or duration))
             return np.array([first, first + share * (self.final_depth - first)])
         return np.array([first])
+
+
+def _time_of_integral(speed: Table | Sinusoid, way: float) -> float | None:
+    """Return the first time [s] at which the integral of a speed is ``way`` [m], by bisection of a monotone piece."""
+    if isinstance(speed, Table):
+        horizon = speed.time[-1] + abs(way / speed.values[-1]) * 2 + 1.0 if speed.values[-1] else speed.time[-1]
+    else:
+        horizon = (2.0 + abs(way / speed.mean if speed.mean else 0.0) * speed.frequency) / speed.frequency
+    marks = [0.0, *speed.zeros(horizon).tolist(), horizon]
+    for start, end in pairwise(marks):
+        low, high = speed.integral(start) - way, speed.integral(end) - way
+        if low * high > 0.0:
+            continue
+        return _bisected(speed, way, start, end)
+    return None
+
+
+def _bisected(speed: Table | Sinusoid, way: float, start: float, end: float) -> float:
+    """Return where the integral of a speed passes ``way`` between two times that enclose it [s]."""
+    sign = speed.integral(start) - way
+    while True:
+        middle = 0.5 * (start + end)
+        if middle in {start, end}:
+            return end
+        if (speed.integral(middle) - way) * sign > 0.0:
+            start = middle
+        else:
+            end = middle
