@@ -101,10 +101,40 @@ def choose_elements(scene: Scene, analysis: str) -> tuple[int, float]:
 
 def mesh_error(scene: Scene, plant: Plant, finer: int) -> float:
     """Return the largest difference of static tips from those on a finer mesh, relative to the largest tip."""
-    coarse = _static_tips(plant)
-    fine = _static_tips(FiniteElementNeedle(scene, elements=finer))
+    return _tip_difference(scene, plant, FiniteElementNeedle(scene, elements=finer))
+
+
+def _tip_difference(scene: Scene, plant: Plant, finer: Plant) -> float:
+    coarse, fine = _static_tips(plant), _static_tips(finer)
     scale = max(float(np.max(np.abs(fine))), scene.numerics.absolute_tolerance)
     return float(np.max(np.abs(coarse - fine))) / scale
+
+
+def choose_mesh(scene: Scene, analysis: str) -> tuple[FiniteElementNeedle, float | None]:
+    """Return the needle on the mesh or with the elements that the scene gives or, on "auto", needs, and what that may cost.
+
+    The error is relative to the largest tip deflection; None where there is nothing finer to compare with.
+    """
+    numerics = scene.numerics
+    if numerics.mesh is None and numerics.elements == "auto":
+        count, error = choose_elements(scene, analysis)
+        return FiniteElementNeedle(scene, elements=count), error
+    plant = _given_mesh(scene, 1)
+    try:
+        finer = _given_mesh(scene, 2)
+    except SceneError:  # more elements than are allowed, or smaller ones
+        return plant, None
+    return plant, _tip_difference(scene, plant, finer)
+
+
+def _given_mesh(scene: Scene, parts: int) -> FiniteElementNeedle:
+    """Return the needle with every element of the scene's own mesh cut into one or two equal parts."""
+    numerics = scene.numerics
+    if numerics.mesh is None:
+        return FiniteElementNeedle(scene, elements=parts * int(numerics.elements))
+    nodes = np.array(numerics.mesh)
+    middles = 0.5 * (nodes[1:] + nodes[:-1])
+    return FiniteElementNeedle(scene, mesh=nodes if parts == 1 else np.sort(np.concatenate((nodes, middles))))
 
 
 def first_time_step(plant: Plant, analysis: str, output_step: float) -> float:

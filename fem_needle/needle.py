@@ -8,9 +8,10 @@ on quartic (or cubic) elements with continuous slope. Derivation: docs/theory.md
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fem_needle import banded
 from fem_needle.elements.integrals import interval_integrals
@@ -20,13 +21,14 @@ from fem_needle.errors import SceneError
 from fem_needle.foundation import Foundation
 from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
 from fem_needle.loads import turns_with_needle
+from fem_needle.mesh_file import MAXIMUM_ELEMENTS, mesh_positions, needle_nodes
 from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Points, RestTerms
 from fem_needle.scene import Guide, LateralLoad, Scene, as_function
 
 Array = NDArray[np.float64]
 
-MAXIMUM_ELEMENTS = 1_000_000
+DEFAULT_ELEMENTS = 40
 SMALLEST_DEPTH_FRACTION = 1e-6  # of the length: below it the inserted part of an `entry` needle is dropped
 
 
@@ -38,14 +40,18 @@ class FiniteElementNeedle:
     scene
         What is modelled.
     elements
-        Equal elements over the part that bends: hub to tip under ``hub``, surface to tip under ``entry``.
+        Equal elements over the part that bends: hub to tip under ``hub``, surface to tip under ``entry``; default: the scene's
+        ``numerics.mesh``, else 40.
     degree
         Polynomial degree 3 (Hermite) or 4 (Hermite and a bubble); default: the scene's ``numerics.degree``.
+    mesh
+        In place of elements: a mesh file, or the positions of the nodes from the hub, 0, to the tip, l [m]. Under ``entry`` they
+        are scaled to the inserted part.
 
     Raises
     ------
     SceneError
-        If ``elements`` or ``degree`` is out of range.
+        If ``elements`` or ``degree`` is out of range, or ``mesh`` is no mesh of this needle.
 
     Notes
     -----
@@ -53,16 +59,21 @@ class FiniteElementNeedle:
     are by depth fraction. The first two are the clamped end's and are prescribed.
     """
 
-    def __init__(self, scene: Scene, *, elements: int = 40, degree: int | None = None) -> None:
-        if not 1 <= elements <= MAXIMUM_ELEMENTS:
-            raise SceneError(f"elements: got {elements}; allowed 1 to {MAXIMUM_ELEMENTS}")
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        elements: int | None = None,
+        degree: int | None = None,
+        mesh: str | Path | ArrayLike | None = None,
+    ) -> None:
         degree = scene.numerics.degree if degree is None else degree
         if degree not in {3, 4}:
             raise SceneError(f"degree: got {degree}; allowed 3 or 4")
         self.scene = scene
         self.is_entry = scene.support.kind == "entry"
         length = scene.needle.length
-        self.mesh = uniform_mesh(1.0 if self.is_entry else length, elements, degree)
+        self.mesh = _line_mesh(scene, elements, degree, mesh)
         self.frame: Frame = StretchedFrame() if self.is_entry else MaterialFrame(length)
         self.foundation = Foundation(scene.tissue.layers, self.mesh, self.frame, scene.tissue.tip_stiffness or 0.0)
         self.size = self.mesh.size
@@ -193,6 +204,24 @@ class _Beam:
     bending: Array
     convection: Array | None
     centrifugal: Array | None
+
+
+def _line_mesh(scene: Scene, elements: int | None, degree: int, mesh: str | Path | ArrayLike | None) -> LineMesh:
+    """Return the mesh: over the arc length [m] under ``hub``, over the depth fraction under ``entry``."""
+    length = scene.needle.length
+    span = 1.0 if scene.support.kind == "entry" else length
+    if elements is not None and mesh is not None:
+        raise SceneError(f"mesh: has its own elements (got elements = {elements}; allowed one of the two)")
+    if mesh is not None:
+        positions = mesh_positions(mesh)
+    elif elements is None and scene.numerics.mesh is not None:
+        positions = np.array(scene.numerics.mesh)
+    else:
+        count = DEFAULT_ELEMENTS if elements is None else elements
+        if not 1 <= count <= MAXIMUM_ELEMENTS:
+            raise SceneError(f"elements: got {count}; allowed 1 to {MAXIMUM_ELEMENTS}")
+        return uniform_mesh(span, count, degree)
+    return LineMesh(needle_nodes(positions, length, span), degree)
 
 
 def _beam_operators(mesh: LineMesh, scene: Scene) -> _Beam:

@@ -5,19 +5,23 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Generator
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from fem_needle.choices import Choice, choose, choose_elements, first_time_step, mesh_error
+from fem_needle.choices import Choice, choose, choose_mesh, first_time_step
 from fem_needle.collocation import collocation
 from fem_needle.errors import ComputationError
 from fem_needle.march import RunEnd, TimeGrid, march, time_grid
+from fem_needle.mesh_file import mesh_positions
 from fem_needle.needle import FiniteElementNeedle
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import march_pushed
 from fem_needle.samples import Sample
 from fem_needle.scene import Scene
+from fem_needle.scene.settings import overriding
 from fem_needle.skipping import inertia_free_stepper
 from fem_needle.steppers import DynamicStepper, StaticStepper, Stepper
 from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
@@ -70,6 +74,7 @@ def run_scene(
     *,
     model: str | None = None,
     elements: int | None = None,
+    mesh: str | Path | ArrayLike | None = None,
     degree: int | None = None,
     time_step: float | None = None,
     tolerance: float | None = None,
@@ -87,6 +92,8 @@ def run_scene(
         "fem".
     elements, degree
         Mesh; default: chosen from the tolerance.
+    mesh
+        In place of elements: a mesh file, or the positions of the nodes from the hub to the tip [m].
     time_step
         Largest step [s]; default: chosen from the tolerance.
     tolerance
@@ -113,22 +120,17 @@ def run_scene(
     values = {
         "model.kind": model,
         "numerics.elements": elements,
+        "numerics.mesh": None if mesh is None else mesh_positions(mesh).tolist(),
         "numerics.degree": degree,
         "numerics.time_step": time_step,
         "numerics.tolerance": tolerance,
         "numerics.analysis": analysis,
         "numerics.output_step": output_step,
     }
-    scene = scene.with_values({path: value for path, value in values.items() if value is not None})
+    scene = scene.with_values(overriding({path: value for path, value in values.items() if value is not None}))
     started = clock.perf_counter()
     choice = choose(scene, lambda count: FiniteElementNeedle(scene, elements=count))
-    given = scene.numerics.elements
-    if given == "auto":
-        given, error = choose_elements(scene, choice.analysis)
-        plant = FiniteElementNeedle(scene, elements=given)
-    else:
-        plant = FiniteElementNeedle(scene, elements=given)
-        error = mesh_error(scene, plant, 2 * given)
+    plant, error = choose_mesh(scene, choice.analysis)
     return _run(_Job(plant, scene, choice, error, observer or _Nobody(), started))
 
 

@@ -35,6 +35,7 @@ def run(
     force: Annotated[bool, typer.Option("--force", help="Replace the run in DIR.")] = False,
     model: Annotated[Text, typer.Option(metavar="KIND", help="fem.")] = None,
     elements: Annotated[Text, typer.Option(metavar="N", help="Elements over the part that bends, or auto.")] = None,
+    mesh: Annotated[Path | None, typer.Option(metavar="FILE", help="Line mesh of the needle, in place of elements.")] = None,
     degree: Annotated[Text, typer.Option(metavar="N", help="Polynomial degree of an element, 3 or 4.")] = None,
     time_step: Annotated[Text, typer.Option(metavar="TIME", help="Largest time step, such as 1e-3 or '1 ms', or auto.")] = None,
     tolerance: Annotated[Text, typer.Option(metavar="X", help="Tip error / largest tip deflection to aim at.")] = None,
@@ -58,6 +59,7 @@ def run(
     options = {
         "model.kind": model,
         "numerics.elements": elements,
+        "numerics.mesh": None if mesh is None else _positions(mesh),
         "numerics.degree": degree,
         "numerics.time_step": time_step,
         "numerics.tolerance": tolerance,
@@ -68,6 +70,13 @@ def run(
     target = RunTarget(RUNS / Path(scene).stem if out is None else out, force, numbered=out is None)
     target.check()
     _run(loaded, target, vtk=not no_vtk, quiet=as_json, explain=explain)
+
+
+def _positions(mesh: Path) -> list[float]:
+    from fem_needle.mesh_file import mesh_positions
+
+    positions: list[float] = mesh_positions(mesh).tolist()
+    return positions
 
 
 def _run(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool, explain: bool) -> None:

@@ -30,7 +30,7 @@ def scene_rows(scene: Scene) -> Iterator[Row]:
 
 def _converted(value: Any, unit: str) -> str:
     shown = display_unit(unit)
-    return "" if shown == unit or isinstance(value, str) else _written(value, shown, unit)
+    return "" if shown == unit or isinstance(value, str | tuple) else _written(value, shown, unit)
 
 
 def _written(value: Any, unit: str, stored_unit: str | None = None) -> str:
@@ -39,6 +39,8 @@ def _written(value: Any, unit: str, stored_unit: str | None = None) -> str:
         return value
     suffix = "" if unit == "1" else f" {unit}"
     size = parse_unit(unit).size / parse_unit(stored_unit or unit).size
+    if isinstance(value, tuple):
+        return f"mesh of {len(value) - 1} elements"
     if isinstance(value, Table | Sinusoid):
         low, high = (extreme / size for extreme in extremes(value))
         kind = f"table of {len(value.time)} points" if isinstance(value, Table) else f"{value.frequency:.6g} Hz"

@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fem_needle.errors import SceneError
+from fem_needle.scene.settings import overriding
 
 if TYPE_CHECKING:
     from fem_needle.scene import Scene
 
 
-def changed(scene: Scene, assignments: Sequence[str], options: Mapping[str, str | None]) -> Scene:
+def changed(scene: Scene, assignments: Sequence[str], options: Mapping[str, Any]) -> Scene:
     """Return a scene with the settings of the command line.
 
     Parameters
@@ -22,7 +23,7 @@ def changed(scene: Scene, assignments: Sequence[str], options: Mapping[str, str 
     assignments
         ``path=value`` each; a value as in a scene file, without quotes where it is a text.
     options
-        Path and text of options; None where not given. They win over assignments.
+        Path and text (or value) of options; None where not given. They win over assignments; a mesh replaces elements.
 
     Raises
     ------
@@ -30,7 +31,8 @@ def changed(scene: Scene, assignments: Sequence[str], options: Mapping[str, str 
         If an assignment has no path or value, or the changed scene is impossible.
     """
     values = dict(_assignment(text) for text in assignments)
-    values |= {path: value_of(text) for path, text in options.items() if text is not None}
+    given = {path: value_of(text) if isinstance(text, str) else text for path, text in options.items() if text is not None}
+    values |= overriding(given)
     return scene.with_values(values) if values else scene
 
 

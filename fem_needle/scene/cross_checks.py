@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from fem_needle.mesh_file import length_mistake
 from fem_needle.scene.loads import LateralLoad
 from fem_needle.scene.part import Mistake
 
@@ -30,6 +31,7 @@ def cross_mistakes(scene: Scene) -> Iterator[Mistake]:
         yield from _kinematics_mistakes(scene)
     else:
         yield from _entry_mistakes(scene)
+    yield from _mesh_mistakes(scene)
 
 
 def _depth_mistakes(scene: Scene) -> Iterator[Mistake]:
@@ -105,3 +107,10 @@ def _entry_mistakes(scene: Scene) -> Iterator[Mistake]:
     if scene.initial.shape == "tip-displaced" and scene.insertion.first_depth <= 1e-6 * scene.needle.length:
         message = "nothing inserted could bend (got 'tip-displaced'; allowed 'equilibrium', 'straight')"
         yield Mistake("initial.shape", message, "tip-displaced")
+
+
+def _mesh_mistakes(scene: Scene) -> Iterator[Mistake]:
+    mesh = scene.numerics.mesh
+    message = None if mesh is None else length_mistake(mesh, scene.needle.length)
+    if mesh is not None and message is not None:
+        yield Mistake("numerics.mesh", message, mesh[-1])

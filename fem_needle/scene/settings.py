@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 
+from fem_needle.scene.node_positions import NodePositions
 from fem_needle.scene.part import Mistake, Part, raise_mistakes
 from fem_needle.scene.quantity import Quantity
 
@@ -99,6 +101,9 @@ class Numerics(Part):
     ----------
     elements
         Equal elements over the part that bends, or ``"auto"``.
+    mesh
+        In place of elements: positions of the nodes from the hub, 0, to the tip [m]; in a scene file also the name of a mesh
+        file. Under the support entry they are scaled to the inserted part.
     degree
         Polynomial degree of an element, 3 or 4.
     time_step
@@ -120,6 +125,7 @@ class Numerics(Part):
     elements: Annotated[
         int | Literal["auto"], Quantity(at_least=1, at_most=1_000_000, integer=True, words=("auto",))
     ] = "auto"
+    mesh: Annotated[tuple[float, ...] | None, NodePositions()] = None
     degree: Annotated[int, Quantity(at_least=3, at_most=4, integer=True)] = 4
     time_step: Annotated[float | Literal["auto"], _STEP] = "auto"
     tolerance: Annotated[float, Quantity(at_least=1e-10, at_most=0.1)] = 1e-3
@@ -128,3 +134,19 @@ class Numerics(Part):
     spectral_radius: Annotated[float, Quantity(at_least=0.0, at_most=1.0)] = 1.0
     output_step: Annotated[float | Literal["auto"], _STEP] = "auto"
     output_points: Annotated[int, Quantity(at_least=2, at_most=100_001, integer=True)] = 101
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.mesh is not None and self.elements != "auto":
+            message = f"a mesh has its own elements (got elements = {self.elements}; allowed one of the two)"
+            raise_mistakes("Numerics", [Mistake("mesh", message, self.elements)])
+        return self
+
+
+def overriding(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings by path, made to win over the scene's: a mesh replaces its elements, and elements its mesh."""
+    result = dict(values)
+    for given, replaced in (("numerics.mesh", "numerics.elements"), ("numerics.elements", "numerics.mesh")):
+        if given in values:
+            result.setdefault(replaced, None)
+    return result

@@ -36,7 +36,7 @@ def read_table(file: str, column: str, folder: Path | None) -> dict[str, Any]:
     ValueError
         If the file is outside the folder, missing, no text, or lacks numbers.
     """
-    lines = read_text(_inside(file, folder)).splitlines()
+    lines = read_text(inside_folder(file, folder)).splitlines()
     try:
         rows = [row for row in csv.reader(lines) if row]
     except csv.Error as error:
@@ -86,7 +86,14 @@ def read_text(path: Path) -> str:
     return text
 
 
-def _inside(file: str, folder: Path | None) -> Path:
+def inside_folder(file: str, folder: Path | None) -> Path:
+    """Return the path of a file that a scene names.
+
+    Raises
+    ------
+    ValueError
+        If it is not inside the scene's folder, or there is none.
+    """
     if folder is None:
         raise ValueError(f"{file!r} needs a scene in a folder; write time and value instead")
     written = Path(file)
