@@ -248,7 +248,10 @@ def row_correction(parts: StepParts, *, inertia: bool, at_start: bool) -> Works:
 
 
 def jump_works(before: StepEnd, after: StepEnd) -> Works:
-    """Return the works at a jump of speed or of the hub's velocity: mean velocity times the jump of momentum."""
+    """Return the works at a jump of speed or of the hub's velocity: mean velocity times the jump of momentum.
+
+    The free coordinates' momentum jumps where a rigid guide strikes; the guide's own -R dw/dy is part of the axial force.
+    """
     left, right = before.solution, after.solution
     jump = axial_momentum(after.stage, right.coordinates, right.velocities) - axial_momentum(
         before.stage, left.coordinates, left.velocities
@@ -257,7 +260,9 @@ def jump_works(before: StepEnd, after: StepEnd) -> Works:
     rates = 0.5 * (before.stage.case.clamp_rates + after.stage.case.clamp_rates)
     clamped = min(2, right.momentum.shape[0])
     hub = float(rates[:clamped] @ (right.momentum - left.momentum)[:clamped]) if np.any(rates) else 0.0
-    return Works(hub_work=hub, boundary_energy=boundary)
+    clamped = after.stage.operators.clamped
+    struck = 0.5 * (left.velocities + right.velocities)[clamped:] @ (right.momentum - left.momentum)[clamped:]
+    return Works(hub_work=hub, boundary_energy=boundary + float(struck))
 
 
 def force_jump_work(before: StepEnd, after: StepEnd) -> Works:

@@ -102,13 +102,31 @@ class DynamicStepper:
             stage = with_path(self.plant, stage, path)
         forces = np.concatenate([solution.forces[:guides], stage.case.forces])
         after = self._state(stage, solution.coordinates, solution.momentum, forces, path)
-        if self.inertia or np.allclose(forces[guides:], solution.forces[guides:], rtol=1e-9, atol=0.0):
+        same = time > 0.0 and np.allclose(forces[guides:], solution.forces[guides:], rtol=1e-9, atol=0.0)
+        if self.inertia:
+            return self._struck(after)
+        if same:  # at t = 0 a needle without inertia need not be where the loads hold it
             return after
         return self._followed(after, until)
 
     def _one_sided(self, instant: Instant, layer_depth: float) -> Instant:
         layers = self.plant.scene.tissue.layers
         return replace(instant, depth=one_sided(layers, instant.depth, layer_depth))
+
+    def _struck(self, start: StepEnd) -> StepEnd:
+        """Let rigid guides strike a needle whose speed or hub has jumped: N q' + v dN/dz q = 0 holds again."""
+        stage, solution, clamped = start.stage, start.solution, self.plant.prescribed
+        points = stage.points
+        rigid = np.flatnonzero(points.guide_compliance == 0.0)
+        if not len(rigid):
+            return start
+        sliding = points.rows[rigid] @ solution.velocities
+        sliding = sliding + stage.instant.speed * (points.row_rates[rigid] @ solution.coordinates)
+        rows = points.rows[rigid, clamped:]
+        mobility = rows @ stage.operators.mass_factorization.solve(rows.T)
+        struck = solution.momentum.copy()
+        struck[clamped:] -= rows.T @ np.linalg.solve(mobility, sliding)
+        return self._state(stage, solution.coordinates, struck, solution.forces, start.path)
 
     def _followed(self, start: StepEnd, until: float) -> StepEnd:
         """Let a needle without inertia follow a jump of the loads: what no viscosity holds moves at once."""
@@ -153,6 +171,8 @@ class DynamicStepper:
             depths, (history, tips) = [*(s.instant.depth for s in stages), stage.instant.depth], cut
             path = self._cut(start, path, depths, [*tips, float(stage.points.rows[-1] @ end_coordinates)])
             stage = with_path(self.plant, stage, path, history)
+        elif path is not None:
+            stage = with_path(self.plant, stage, path)
         forces = np.concatenate([self._end_reactions(stage, end_coordinates, solutions), case.forces])
         end = self._state(stage, end_coordinates, end_momentum, forces, path)
         return Step(self.plant, self.method, length, (start, end), stages, solutions, system)
@@ -237,6 +257,8 @@ class DynamicStepper:
                 with_path(self.plant, stage, whole.seen_from(stage.instant.depth, tip), history)
                 for stage, tip in zip(found, tips.tolist(), strict=True)
             ]
+        elif start.path is not None:
+            found = [with_path(self.plant, stage, start.path) for stage in found]
         return found[0], found[1]
 
     def _state(
