@@ -53,8 +53,12 @@ RANKS = {
     # whole runs
     "simulation": 12,
     "run_folder": 12,
-    "cli": 13,
-    "__main__": 14,
+    "csv_file": 12,
+    "matlab_file": 12,
+    "vtkhdf_file": 12,
+    "export": 13,
+    "cli": 14,
+    "__main__": 15,
 }
 # A convenience of the result that reaches upward, when it is called and not before.
 LATE = {("trajectory", "run_folder")}
