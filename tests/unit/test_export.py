@@ -207,7 +207,8 @@ def worst(rebuilt: list[np.ndarray], exact: list[np.ndarray]) -> float:
 
 
 @pytest.mark.parametrize(
-    ("name", "moment", "shear"), [("thesis", 4e-3, 0.05), ("bench-m2", 4e-3, 0.05), ("bench-d", 4e-3, None), ("misra-2010", 0.05, None)]
+    ("name", "moment", "shear"),
+    [("thesis", 4e-3, 0.05), ("bench-m2", 4e-3, 0.05), ("bench-d", 4e-3, None), ("misra-2010", 0.05, None)],
 )
 def test_how_good_rebuilt_moments_are(tmp_path, export, name, moment, shear):
     """As docs/contract.md says; the frames of the run itself are the reference."""
