@@ -240,6 +240,7 @@ def load_run(folder: Path) -> Trajectory:
     missing = {"time", "arc_length", "deflection", "guide_force", *VARIABLES} - set(values)
     if missing or not isinstance(summary, dict):
         raise SceneError(f"{folder}: the run is not complete: no {', '.join(sorted(missing)) or 'summary'}")
+    _check_shapes(folder, values)
     return Trajectory(
         scene=load_scene(folder / SCENE),
         time=values["time"],
@@ -251,3 +252,14 @@ def load_run(folder: Path) -> Trajectory:
         station_deflection=values["deflection"],
         summary=summary | {"folder": str(folder.resolve())},
     )
+
+
+def _check_shapes(folder: Path, values: dict[str, Array]) -> None:
+    """Refuse series whose variables do not belong together."""
+    rows, stations = values["time"].size, values["arc_length"].size
+    expected: dict[str, tuple[int, ...]] = dict.fromkeys(("time", *VARIABLES), (rows,))
+    expected |= {"arc_length": (stations,), "deflection": (rows, stations)}
+    expected |= {"guide_force": (rows, values["guide_force"].shape[-1] if values["guide_force"].ndim else 0)}
+    wrong = [name for name, shape in expected.items() if values[name].shape != shape]
+    if wrong or rows == 0 or stations < 2:
+        raise SceneError(f"{folder}: {SERIES} is damaged: wrong shape of {', '.join(wrong) or 'time or arc_length'}")

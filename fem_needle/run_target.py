@@ -9,8 +9,9 @@ from pathlib import Path
 from fem_needle.errors import SceneError
 from fem_needle.manifest import is_run_folder
 
-# What a run folder holds; `force` removes this and nothing else.
-FILES = ("summary.json", "series.nc", "deflection.pvd", "scene.toml", "manifest.json")
+# What a run folder holds, exports of an older run included; `force` removes this and nothing else.
+EXPORTS = ("series.csv", "deflection.csv", "series.mat", "deflection.vtkhdf")
+FILES = ("summary.json", "series.nc", "deflection.pvd", *EXPORTS, "scene.toml", "manifest.json")
 FRAMES = (("needle", "*.vtp"), ("tissue", "*.vtu"))
 
 

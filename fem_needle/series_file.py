@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import h5netcdf
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,11 +29,8 @@ FIELDS = {
 }
 
 
-def series_bytes(run: Trajectory) -> bytes:
-    """Return the file of a run.
-
-    Built in memory: a full disk then meets one plain write instead of a half-written HDF5 file.
-    """
+def described_values(run: Trajectory) -> dict[str, tuple[tuple[str, ...], str, str, Array]]:
+    """Return dimensions, unit, meaning and values of everything that the series of a run hold, by name, in their order."""
     guides = np.array([guide.position for guide in run.scene.support.guides], dtype=float)
     values = {
         "time": run.time,
@@ -45,20 +43,28 @@ def series_bytes(run: Trajectory) -> bytes:
         "path_deflection": run.path_deflection,
     }
     described = COORDINATES | {name: (("time",), *about) for name, about in VARIABLES.items()} | FIELDS
-    memory = BytesIO()
+    return {name: (*about, np.asarray(values[name], dtype=float)) for name, about in described.items()}
+
+
+def series_bytes(run: Trajectory) -> bytes:
+    """Return the file of a run.
+
+    Built in memory: a full disk then meets one plain write instead of a half-written HDF5 file.
+    """
+    described, memory = described_values(run), BytesIO()
+    guides = described["guide"][3]
     with h5netcdf.File(memory, "w") as file:
         file.attrs.update({"title": run.scene.title, "Conventions": "CF-1.8", "format": 1})
         sizes = {"time": run.time.size, "arc_length": run.arc_length.size, "guide": guides.size}
         file.dimensions = sizes | {"path": run.path_position.size}
-        for name, (dimensions, unit, meaning) in described.items():
-            _add(file, name, dimensions, values[name], {"units": unit, "long_name": meaning})
+        for name, (dimensions, unit, meaning, values) in described.items():
+            _add(file, name, dimensions, values, {"units": unit, "long_name": meaning})
     return memory.getvalue()
 
 
 def _add(file: Any, name: str, dimensions: tuple[str, ...], values: Array, attributes: dict[str, str]) -> None:
-    data = np.asarray(values, dtype=float)
-    packing: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if data.size else {}
-    variable = file.create_variable(name, dimensions, "f8", data=data, fillvalue=None, **packing)
+    packing: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True} if values.size else {}
+    variable = file.create_variable(name, dimensions, "f8", data=values, fillvalue=None, **packing)
     variable.attrs.update(attributes)
 
 
@@ -68,7 +74,11 @@ def read_series(path: Path) -> dict[str, Array]:
     Raises
     ------
     OSError
-        If there is no such file, or it is not netCDF-4.
+        If there is no such file, or it is damaged or not netCDF-4.
     """
-    with h5netcdf.File(path, "r") as file:
-        return {name: np.asarray(variable[...], dtype=float) for name, variable in file.variables.items()}
+    # With h5py: h5netcdf leaves a traceback on stderr where it cannot open a file.
+    try:
+        with h5py.File(path, "r") as file:
+            return {name: np.asarray(item[...], dtype=float) for name, item in file.items() if isinstance(item, h5py.Dataset)}
+    except (KeyError, RuntimeError, TypeError, ValueError) as error:
+        raise OSError(f"series.nc is damaged: {error}") from None

@@ -48,6 +48,8 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "axial_kinetic_energy": ("J", "kinetic energy of the insertion"),
 }
 
+SAME_STATION = 1e-6  # of the length
+
 _FROM_SAMPLES = tuple(
     name
     for name in VARIABLES
@@ -120,17 +122,18 @@ class Trajectory:
         )
 
     def _from_stations(self, row: int, stations: Array, derivative: int) -> Array:
-        values, start = self.station_deflection[row], 0.0
+        values, start = self.station_deflection[row], -np.inf
         if self.scene.support.kind == "entry":
             start = self.scene.needle.length - float(self.depth[row])
-        bent = self.arc_length > start
+        # A station next to the surface would add nothing but round-off.
+        bent = self.arc_length > start + SAME_STATION * self.scene.needle.length
         if np.count_nonzero(bent) < 2:
             return np.zeros(stations.shape)
         knots, known = self.arc_length[bent], values[bent]
         clamp: Any = "not-a-knot"
-        if start > 0:
+        if np.isfinite(start):
             knots, known, clamp = np.append(start, knots), np.append(0.0, known), ((1, 0.0), (2, 0.0))
-        return np.where(stations >= start, CubicSpline(knots, known, bc_type=clamp)(stations, derivative), 0.0)
+        return np.where(stations > start, CubicSpline(knots, known, bc_type=clamp)(stations, derivative), 0.0)
 
     def save(self, folder: str | Path, *, force: bool = False) -> Path:
         """Write a run folder (docs/contract.md); refuse an existing one unless ``force``."""

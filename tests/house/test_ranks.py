@@ -47,7 +47,7 @@ RANKS = {
     "initial": 8,
     "steppers": 8,
     "samples": 9,
-    "pushing": 9,
+    "pushing": 10,
     "march": 10,
     "pushed_march": 11,
     "skipping": 11,
@@ -58,8 +58,12 @@ RANKS = {
     # whole runs
     "simulation": 13,
     "run_folder": 13,
-    "cli": 14,
-    "__main__": 15,
+    "csv_file": 13,
+    "matlab_file": 13,
+    "vtkhdf_file": 13,
+    "export": 14,
+    "cli": 15,
+    "__main__": 16,
 }
 # A convenience of the result that reaches upward, when it is called and not before.
 LATE = {("trajectory", "run_folder")}

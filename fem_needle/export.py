@@ -1,0 +1,122 @@
+"""Runs in other formats; `FORMATS` names them. Nothing is overwritten by accident."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fem_needle.atomic_file import write_atomically
+from fem_needle.csv_file import deflection_csv, series_csv
+from fem_needle.errors import ComputationError, SceneError
+from fem_needle.matlab_file import matlab_file
+from fem_needle.run_target import FRAMES
+from fem_needle.trajectory import Trajectory
+from fem_needle.vtk_export import COLLECTION, VtkSeries, frames_of_run
+from fem_needle.vtkhdf_file import vtkhdf_file
+
+FORMATS = ("pvd", "vtkhdf", "csv", "mat")
+SPLINE = (
+    "bending_moment and shear_force come from a spline through the stations: the moment is good to some percents, "
+    "the shear force is rough, most of all beside guides and lateral forces; the frames of the run itself are exact"
+)
+REBUILT = {"pvd": SPLINE, "vtkhdf": SPLINE}  # formats with values that a run folder does not hold
+
+_FILES: dict[str, dict[str, Callable[[Trajectory], bytes]]] = {
+    "csv": {"series.csv": series_csv, "deflection.csv": deflection_csv},
+    "mat": {"series.mat": matlab_file},
+    "vtkhdf": {"deflection.vtkhdf": vtkhdf_file},
+}
+
+
+def export_run(run: Trajectory, kind: str, path: Path, *, force: bool = False) -> tuple[Path, ...]:
+    """Write a run in another format and return the files to open.
+
+    Parameters
+    ----------
+    run
+        The run.
+    kind
+        One of `FORMATS`.
+    path
+        A folder; "mat" and "vtkhdf" take a path with their ending as the file itself.
+    force
+        Replace an earlier export.
+
+    Raises
+    ------
+    SceneError
+        If the format is unknown, or something is there that must not be overwritten.
+    ComputationError
+        If the files cannot be written.
+    """
+    if kind not in FORMATS:
+        raise SceneError(f"format: is not a choice (got {kind!r}; allowed {', '.join(FORMATS)})")
+    if kind == "pvd":
+        return _export_frames(run, path, force=force)
+    targets = _targets(kind, path)
+    for target in targets:
+        _check(target, force=force)
+    for target, content in targets.items():
+        with _writing(target):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(target, content(run))
+    return tuple(targets)
+
+
+def _targets(kind: str, path: Path) -> dict[Path, Callable[[Trajectory], bytes]]:
+    if path.suffix == f".{kind}" and kind in {"mat", "vtkhdf"}:
+        return dict.fromkeys((path,), *_FILES[kind].values())
+    return {path / name: content for name, content in _FILES[kind].items()}
+
+
+def _check(target: Path, *, force: bool) -> None:
+    """Refuse to overwrite a folder or, without ``force``, a file, and places that cannot be."""
+    try:
+        exists, is_folder = target.exists(), target.is_dir()
+        holder = next(folder for folder in target.absolute().parents if folder.exists())
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{target}: cannot be written: {error}") from None
+    if is_folder:
+        raise SceneError(f"{target}: cannot be written: it is a folder")
+    if not holder.is_dir():
+        raise SceneError(f"{target}: cannot be written: {holder} is no folder")
+    if exists and not force:
+        raise SceneError(f"{target}: exists already; --force (force=True) replaces it")
+
+
+def _export_frames(run: Trajectory, folder: Path, *, force: bool) -> tuple[Path, ...]:
+    """Write `deflection.pvd` with its frames, as the run itself does."""
+    collection = folder / COLLECTION
+    _check(collection, force=force)
+    _check_frames(folder, force=force)
+    with _writing(collection):
+        folder.mkdir(parents=True, exist_ok=True)
+        collection.unlink(missing_ok=True)
+        for name, pattern in FRAMES:
+            for old in (folder / name).glob(pattern):
+                old.unlink()
+        series = VtkSeries(folder, run.scene, run.arc_length)
+        for frame in frames_of_run(run):
+            series.add(frame)
+        series.close()
+    return (collection,)
+
+
+def _check_frames(folder: Path, *, force: bool) -> None:
+    """Refuse frames that no list names, and folders that lead elsewhere."""
+    for name, pattern in FRAMES:
+        frames = folder / name
+        if frames.is_symlink() or (frames.exists() and not frames.is_dir()):
+            raise SceneError(f"{frames}: is no folder of frames; it is left as it is")
+        listed = force and (folder / COLLECTION).exists()
+        if frames.is_dir() and any(frames.glob(pattern)) and not listed:
+            raise SceneError(f"{frames}: holds frames of something else; they are left as they are (name another folder)")
+
+
+@contextmanager
+def _writing(target: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise ComputationError(f"{target} cannot be written: {error.strerror or error}") from error
