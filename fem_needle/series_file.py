@@ -20,12 +20,12 @@ COORDINATES = {
     "time": (("time",), "s", "time since the start of the run"),
     "arc_length": (("arc_length",), "m", "station along the needle from the hub, 0, to the tip"),
     "guide": (("guide",), "m", "position y of the guide; negative before the surface"),
-    "path_position": (("path",), "m", "y of the path that the tip has cut, at the end of the run"),
+    "path_position": (("path_position",), "m", "y of the path that the tip has cut, at the end of the run"),
 }
 FIELDS = {
     "deflection": (("time", "arc_length"), "m", "lateral displacement of the needle"),
     "guide_force": (("time", "guide"), "N", "lateral force of the guide on the needle"),
-    "path_deflection": (("path",), "m", "rest line of the tissue there"),
+    "path_deflection": (("path_position",), "m", "rest line of the tissue there"),
 }
 
 
@@ -56,7 +56,7 @@ def series_bytes(run: Trajectory) -> bytes:
     with h5netcdf.File(memory, "w") as file:
         file.attrs.update({"title": run.scene.title, "Conventions": "CF-1.8", "format": 1})
         sizes = {"time": run.time.size, "arc_length": run.arc_length.size, "guide": guides.size}
-        file.dimensions = sizes | {"path": run.path_position.size}
+        file.dimensions = sizes | {"path_position": run.path_position.size}
         for name, (dimensions, unit, meaning, values) in described.items():
             _add(file, name, dimensions, values, {"units": unit, "long_name": meaning})
     return memory.getvalue()

@@ -6,7 +6,7 @@ Vector with `deflection` (needle) or `displacement_illustrative` (tissue) bends 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -48,8 +48,8 @@ class Frame:
     deflection: Array
     curvature: Array
     third_derivative: Array
-    path_position: Array
-    path_deflection: Array
+    path_position: Array = field(default_factory=lambda: np.zeros(0))
+    path_deflection: Array = field(default_factory=lambda: np.zeros(0))
 
     def rest_line(self, positions: Array) -> Array:
         """Return where the tissue's springs rest [m] at positions y [m]: on the path cut so far, else on the axis."""

@@ -108,6 +108,8 @@ DIMENSIONS = dict.fromkeys(VARIABLES, ("time",)) | {
     "guide": ("guide",),
     "deflection": ("time", "arc_length"),
     "guide_force": ("time", "guide"),
+    "path_position": ("path_position",),
+    "path_deflection": ("path_position",),
 }
 
 
