@@ -69,7 +69,7 @@ def needles() -> st.SearchStrategy[dict[str, Any]]:
 def layers() -> st.SearchStrategy[list[dict[str, Any]]]:
     """Up to three layers that do not overlap, with and without gaps."""
     keys = {"foundation_modulus": numbers(0.0, 1e12)}
-    options = {"damping": numbers(0.0, 1e6), "cutting_force": numbers(0.0, 10.0)}
+    options = {"damping": numbers(0.0, 1e6), "cutting_force": numbers(0.0, 10.0), "puncture_force": numbers(0.0, 10.0)}
     layer = st.fixed_dictionaries(keys, optional=options)
     borders = st.lists(numbers(0.0, 0.5), min_size=6, max_size=6, unique=True).map(sorted)
     return st.tuples(st.lists(layer, max_size=3), borders, st.lists(st.text(min_size=1), min_size=3, unique=True)).map(
@@ -85,6 +85,10 @@ def insertions() -> st.SearchStrategy[dict[str, Any]]:
     return st.one_of(
         st.fixed_dictionaries({"kind": st.just("hold"), "initial_depth": start}),
         st.fixed_dictionaries({"kind": st.just("profile"), "depth": time_values(0.0, 0.09)}),
+        st.fixed_dictionaries(
+            {"kind": st.just("force"), "initial_depth": start, "push_force": time_values(-10.0, 10.0)},
+            optional={"final_depth": numbers(0.05, 0.09)},
+        ),
         st.fixed_dictionaries(
             {"kind": st.just("speed"), "initial_depth": start, "speed": numbers(1e-6, 10.0), "final_depth": numbers(0.05, 0.09)}
         ),
@@ -102,13 +106,21 @@ def scene_data() -> st.SearchStrategy[dict[str, Any]]:
         {"kind": st.just("hub")},
         optional={"hub_deflection": time_values(-0.1, 0.1), "hub_angle": time_values(-0.5, 0.5)},
     )
-    tissue = st.fixed_dictionaries({"layers": layers()}, optional={"stiffness_factor": time_values(0.0, 5.0)})
+    free = st.fixed_dictionaries(
+        {"kind": st.just("hub"), "hub_rotation": st.just("free"), "hub_rotational_inertia": numbers(1e-9, 1.0)},
+        optional={"hub_torque": time_values(-1.0, 1.0)},
+    )
+    factor = {"stiffness_factor": time_values(0.0, 5.0)}
+    tissue = st.one_of(
+        st.fixed_dictionaries({"layers": layers()}, optional=factor),
+        st.fixed_dictionaries({"kind": st.just("tip-spring"), "tip_stiffness": numbers(0.0, 1e6)}, optional=factor),
+    )
     numerics = st.fixed_dictionaries(
         {},
         optional={
             "elements": st.one_of(st.just("auto"), st.integers(1, 1_000_000)),
             "time_step": st.one_of(st.just("auto"), numbers(1e-9, 1.0)),
-            "analysis": st.sampled_from(["auto", "dynamic", "quasi-static", "static"]),
+            "analysis": st.sampled_from(["auto", "dynamic", "quasi-static"]),
             "degree": st.sampled_from([3, 4]),
         },
     )
@@ -122,6 +134,8 @@ def scene_data() -> st.SearchStrategy[dict[str, Any]]:
     }
     entry = st.just({"kind": "entry"})
     return st.one_of(
-        st.fixed_dictionaries(common | {"support": hub, "loads": st.lists(st.one_of(tip, bevel, lateral), max_size=3)}),
+        st.fixed_dictionaries(
+            common | {"support": st.one_of(hub, free), "loads": st.lists(st.one_of(tip, bevel, lateral), max_size=3)}
+        ),
         st.fixed_dictionaries(common | {"support": entry, "loads": st.lists(st.one_of(tip, bevel), max_size=3)}),
     )

@@ -75,6 +75,9 @@ def test_a_needle_in_two_ways_or_none_is_refused(keys, message):
         (lambda x: Layer(foundation_modulus=1.0, cutting_force=x), "cutting_force", (0.0,), (-1e-9,)),
         (lambda x: Layer(foundation_modulus=1.0, start=x), "start", (0.0,), (-1e-9,)),
         (lambda x: Layer(foundation_modulus=1.0, start=0.1, end=x), "end", (0.11,), (0.1, 0.05)),
+        (lambda x: Layer(foundation_modulus=1.0, puncture_force=x), "puncture_force", (0.0,), (-1e-9,)),
+        (lambda x: Tissue(kind="tip-spring", tip_stiffness=x), "tip_stiffness", (0.0,), (-1e-9,)),
+        (lambda x: Support(kind="hub", hub_rotation="free", hub_rotational_inertia=x), "inertia", (1e-12,), (0.0, -1.0)),
         (lambda x: Guide(position=-0.1, stiffness=x), "stiffness", ("rigid", 1e-9), (0.0, -1.0, "loose")),
         (lambda x: Tissue(stiffness_factor=x), "stiffness_factor", (0.0,), (-0.1,)),
         (lambda x: Friction(coulomb=x), "coulomb", (0.0,), (-0.1,)),
@@ -215,6 +218,28 @@ def test_nothing_outside_under_entry(keys):
     Support(kind="hub", **keys)
     with pytest.raises(ValidationError, match=f"{next(iter(keys))}\n.*no meaning under 'entry'"):
         Support(kind="entry", **keys)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"hub_rotation": "free"}, "hub_rotational_inertia\n.*required"),
+        ({"hub_rotation": "free", "hub_rotational_inertia": 1e-5, "hub_angle": 0.1}, "hub_angle\n.*no prescribed angle"),
+        ({"hub_torque": 0.1}, "hub_torque\n.*no meaning on a fixed hub"),
+        ({"hub_rotational_inertia": 1e-5}, "hub_rotational_inertia\n.*no meaning on a fixed hub"),
+        ({"hub_rotation": "loose"}, "hub_rotation"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["hub", "entry"])
+def test_what_a_free_hub_needs_and_a_fixed_one_does_not_have(kind, keys, message):
+    with pytest.raises(ValidationError, match=message):
+        Support(kind=kind, **keys)
+
+
+@pytest.mark.parametrize("kind", ["hub", "entry"])
+def test_a_free_hub(kind):
+    free = Support(kind=kind, hub_rotation="free", hub_rotational_inertia="1e-5 kg m^2", hub_torque="2 N mm")
+    assert (free.hub_rotational_inertia, free.hub_torque) == (1e-5, pytest.approx(2e-3))
 
 
 def test_two_guides_at_one_place():

@@ -126,6 +126,39 @@ def test_an_insertion_without_an_end_needs_a_duration(insertion):
     assert line.startswith("run.duration: is required")
 
 
+def test_a_push_needs_a_final_depth_or_a_duration():
+    push = {"kind": "force", "initial_depth": 0.1, "push_force": "1 N"}
+    Scene.from_dict(entry_data(insertion=push))
+    Scene.from_dict(entry_data(insertion=push | {"final_depth": 0.15}, run={}))
+    (line,) = mistakes_of(entry_data(insertion=push, run={}))
+    assert line.startswith("run.duration: is required")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"final_depth": 0.1}, "insertion.final_depth: a push ends deeper than it began (got 0.1; allowed above initial"),
+        ({"final_depth": 0.05}, "insertion.final_depth: a push ends deeper"),
+        ({"final_depth": 0.21}, "insertion.final_depth: deeper than the needle is long"),
+        ({"initial_depth": 0.21}, "insertion.initial_depth: deeper than the needle is long"),
+    ],
+)
+def test_where_a_push_may_end(changes, message):
+    push = {"kind": "force", "initial_depth": 0.1, "push_force": 1.0}
+    assert message in mistakes_of(entry_data(insertion=push | changes))[0]
+
+
+def test_what_has_history_or_motion_is_not_static():
+    static = {"numerics": {"analysis": "static"}}
+    push = {"kind": "force", "initial_depth": 0.1, "push_force": 1.0}
+    cut = {"rest_line": "cut-path", "layers": [{"foundation_modulus": 520.0}]}
+    lines = mistakes_of(entry_data(insertion=push, tissue=cut, **static))
+    assert [line.split("(")[0].strip() for line in lines] == [
+        "numerics.analysis: a push needs motion",
+        "numerics.analysis: a cut path needs history",
+    ]
+
+
 def test_entry_has_no_lateral_force_and_hub_no_fixed_frame():
     load = {"kind": "lateral", "position": -0.01, "force": 1.0}
     assert "loads.0.kind" in mistakes_of(entry_data(loads=[load]))[0]
