@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
-from fem_needle.motion import PUSH_SLACK, depth_law, run_duration
+from fem_needle.motion import PUSH_SLACK, depth_law, run_duration, shortest_period
 from fem_needle.needle import FiniteElementNeedle
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import run_limits
@@ -21,7 +21,6 @@ from fem_needle.skipping import (
     POINTS_PER_PERIOD,
     Skipped,
     inertia_effect,
-    shortest_period,
     unneeded_terms,
 )
 from fem_needle.statics import solve_static

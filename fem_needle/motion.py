@@ -162,6 +162,17 @@ def run_duration(scene: Scene) -> float:
     return float(scene.insertion.end_time or 0.0)
 
 
+def shortest_period(scene: Scene) -> float:
+    """Return the shortest period [s] of any sinusoid of the scene, infinity without one."""
+    insertion = scene.insertion
+    support = scene.support
+    sources = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
+    sources += [value for value in (insertion.speed, insertion.depth, insertion.push_force) if value is not None]
+    sources += [load.force for load in scene.loads if load.force is not None]
+    rates = [abs(source.frequency) for source in sources if isinstance(source, Sinusoid)]
+    return 1.0 / max(rates) if rates and max(rates) > 0 else float("inf")
+
+
 def landing_times(scene: Scene, law: DepthLaw, duration: float, smallest_depth: float) -> tuple[float, ...]:
     """Return every time in (0, duration) on which a step must land: kinks of motion, loads and layers."""
     support = scene.support

@@ -13,7 +13,7 @@ from fem_needle.errors import ComputationError
 from fem_needle.initial import initial_state
 from fem_needle.ledger import Works, jump_works, row_correction, step_works
 from fem_needle.march import RunEnd, TimeGrid, row_change
-from fem_needle.motion import depth_law
+from fem_needle.motion import depth_law, shortest_period
 from fem_needle.plant import Plant
 from fem_needle.pushing import Limits, Pusher, PushState, PushStep, StepMotion, first_event, locate
 from fem_needle.samples import Sample, sample_step
@@ -21,6 +21,7 @@ from fem_needle.scene import Scene
 from fem_needle.segments import interfaces
 from fem_needle.steppers import DynamicStepper, Step
 
+STEPS_PER_PERIOD = 32  # of a swinging push: between two ends of steps it is looked for no second crossing of a threshold
 STUCK_MARGIN = 10.0  # times |A|: a needle this far below its thresholds stays
 
 
@@ -65,7 +66,7 @@ def march_pushed(plant: Plant, stepper: DynamicStepper, grid: TimeGrid) -> Gener
     pusher, limits = Pusher(stepper), run_limits(plant.scene)
     run = _Run(_initial_push_state(pusher, grid), Works())
     for start, end, count in grid.intervals():
-        length = (end - start) / count
+        length = min((end - start) / count, shortest_period(plant.scene) / STEPS_PER_PERIOD)
         while run.state.time < end - 1e-12 * length:
             until = min(run.state.time + length, end)
             until = end if end - until < 1e-9 * length else until

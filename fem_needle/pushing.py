@@ -290,7 +290,11 @@ def locate(pusher: Pusher, state: PushState, until: float, direction: int, event
             high, high_value, found = time, value, step or found
     if found is None:
         raise FloatingPointError("the insertion speed does not converge")
-    landed = replace(found.state, depth=level) if kind == "reaches" else replace(found.state, speed=0.0)
+    if kind != "reaches":
+        return replace(found, state=replace(found.state, speed=0.0), event=kind)
+    # Exactly there: a rounding beyond would count as cut, or as pierced.
+    entered = state.punctured | axial.entered_layers(pusher.scene, level)
+    landed = replace(found.state, depth=level, deepest=max(state.deepest, level), punctured=entered)
     return replace(found, state=landed, event=kind)
 
 

@@ -13,10 +13,10 @@ from fem_needle import banded
 from fem_needle.collocation import collocation
 from fem_needle.free_response import ringing
 from fem_needle.march import TimeGrid, march
-from fem_needle.motion import depth_law, landing_times, run_duration
+from fem_needle.motion import depth_law, landing_times, run_duration, shortest_period
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample
-from fem_needle.scene import LateralLoad, Scene, Sinusoid
+from fem_needle.scene import LateralLoad, Scene
 from fem_needle.statics import depth_derivative, solve_guided, solve_static
 from fem_needle.steppers import DynamicStepper, Massless, StaticStepper, Stepper
 
@@ -42,17 +42,6 @@ def inertia_free_stepper(plant: Plant) -> Stepper:
     if remembers or any(layer.damping > 0 for layer in tissue.layers):
         return DynamicStepper(Massless(plant), collocation(0.0), inertia=False)
     return StaticStepper(plant)
-
-
-def shortest_period(scene: Scene) -> float:
-    """Return the shortest period [s] of any sinusoid of the scene, infinity without one."""
-    insertion = scene.insertion
-    support = scene.support
-    sources = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
-    sources += [value for value in (insertion.speed, insertion.depth, insertion.push_force) if value is not None]
-    sources += [load.force for load in scene.loads if load.force is not None]
-    rates = [abs(source.frequency) for source in sources if isinstance(source, Sinusoid)]
-    return 1.0 / max(rates) if rates and max(rates) > 0 else float("inf")
 
 
 def inertia_effect(plant: Plant) -> float:

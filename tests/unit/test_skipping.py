@@ -6,8 +6,9 @@ from fem_needle import FiniteElementNeedle, banded, simulate
 from fem_needle.exact import natural_frequencies
 from fem_needle.free_response import natural_frequencies as computed_frequencies
 from fem_needle.free_response import ringing
+from fem_needle.motion import shortest_period
 from fem_needle.scene import Guide, Initial, Insertion, Layer, Sinusoid, TipLoad
-from fem_needle.skipping import inertia_effect, inertia_free_stepper, shortest_period, unneeded_terms
+from fem_needle.skipping import inertia_effect, inertia_free_stepper, unneeded_terms
 from fem_needle.steppers import DynamicStepper, StaticStepper
 from tests.consistency.scenes import DAMPED, GEL, held, moving, relative, scene_of
 
