@@ -12,7 +12,7 @@ from fem_needle.loads import LoadCase, load_case
 from fem_needle.motion import DepthLaw
 from fem_needle.path import straight_path
 from fem_needle.plant import Plant
-from fem_needle.stages import Stage, StageSolution, evaluate_stage, momentum, trivial_solution
+from fem_needle.stages import Stage, StageSolution, evaluate_stage, momentum, trivial_solution, with_path
 from fem_needle.statics import depth_derivative, solve_static, static_state
 
 Array = NDArray[np.float64]
@@ -28,7 +28,11 @@ def initial_state(plant: Plant, law: DepthLaw) -> StepEnd:
     case = load_case(scene, law.depth(0.0), 0.0)
     path = straight_path(law.depth(0.0)) if scene.tissue.rest_line == "cut-path" else None
     stage = evaluate_stage(plant, law.after(0.0), case, path=path)
-    return StepEnd(stage, _initial_solution(plant, law, stage), path)
+    solution = _initial_solution(plant, law, stage)
+    if path is not None:  # in front of the jump at the initial depth the path begins at the tip
+        path = path.seen_from(stage.instant.depth, float(stage.points.rows[-1] @ solution.coordinates))
+        stage = with_path(plant, stage, path)
+    return StepEnd(stage, solution, path)
 
 
 def _initial_solution(plant: Plant, law: DepthLaw, stage: Stage) -> StageSolution:

@@ -18,7 +18,7 @@ from fem_needle.loads import LoadCase, is_steady, load_case
 from fem_needle.motion import Instant, Motion
 from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Plant
-from fem_needle.segments import one_sided
+from fem_needle.segments import ROUNDINGS, one_sided
 from fem_needle.stages import (
     PathHistory,
     Stage,
@@ -189,8 +189,8 @@ class DynamicStepper:
 
     def _cut(self, start: StepEnd, path: CutPath, depths: list[float], tips: list[float]) -> CutPath:
         """Return the path after the tip has passed given depths with given deflections."""
-        if depths[-1] < path.deepest:
-            return path
+        if depths[-1] <= path.deepest * (1 + ROUNDINGS):
+            return path.seen_from(depths[-1] * (1 + ROUNDINGS), tips[-1])
         return path.extended([start.stage.instant.depth, *depths], [self._tip(start.stage, start.solution), *tips])
 
     def _tip(self, stage: Stage, solution: StageSolution) -> float:

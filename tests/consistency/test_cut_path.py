@@ -56,7 +56,6 @@ def test_a_slow_loop_with_inertia_and_viscosity_returns(kind):
     assert np.ptp(run.tip_deflection) > 0.01 * run.tip_deflection[-1]
 
 
-@pytest.mark.xfail(strict=True, reason="a step that comes back to the deepest point cuts a piece of one rounding")
 @pytest.mark.parametrize("kind", ["entry", "hub"])
 def test_the_path_remembers_the_tip_and_nothing_on_the_way_out(kind):
     run = run_of(scene_of(kind, LOOP, FIRM, duration=1.2, **CUT), 0.02, output_step=0.02)
@@ -245,7 +244,7 @@ SWELLS = {"tissue": {"rest_line": "cut-path", "stiffness_factor": Table(time=[0.
 @pytest.mark.parametrize(
     "analysis",
     [
-        pytest.param("dynamic", marks=pytest.mark.xfail(strict=True, reason="the front of the path is 0 at t = 0, not the tip")),
+        "dynamic",
         "quasi-static",
     ],
 )
