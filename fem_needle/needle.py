@@ -107,6 +107,8 @@ class FiniteElementNeedle:
 
     def clamp_reactions(self, residual: Array, depth: float) -> tuple[float, float]:
         """Return force [N] and moment [N m] of the clamp; a slope by depth fraction is z times the angle."""
+        if self.turns:  # nothing but the torque, a load, turns a free hub
+            return float(residual[0]), 0.0
         return float(residual[0]), float(residual[1]) * self.frame.stretch(depth)
 
     def straight(self, deflection: float, angle: float) -> Array:

@@ -22,6 +22,7 @@ from fem_needle.segments import interfaces
 from fem_needle.steppers import DynamicStepper, Step
 
 STEPS_PER_PERIOD = 32  # of a swinging push: between two ends of steps it is looked for no second crossing of a threshold
+TRIAL_ERRORS = (FloatingPointError, np.linalg.LinAlgError, SingularMatrixError)
 STUCK_MARGIN = 10.0  # times |A|: a needle this far below its thresholds stays
 
 
@@ -100,7 +101,7 @@ def _guarded(pusher: Pusher, run: _Run, until: float, limits: RunLimits) -> Push
         direction, levels = pusher.direction(state), _levels(pusher, state, limits)
         try:
             step = pusher.step(state, until, run.last, direction)
-        except FloatingPointError:  # A jumps where the tip passes an interface: end the step there
+        except TRIAL_ERRORS:  # A jumps where the tip passes an interface, a guide comes to an end at the hub: stop there
             event = levels.next(state.depth, direction)
             if event is None:
                 raise

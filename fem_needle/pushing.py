@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import axial
+from fem_needle.banded import SingularMatrixError
 from fem_needle.collocation import Collocation
 from fem_needle.ledger import StepEnd, Works, axial_momentum, configuration_force
 from fem_needle.motion import Instant
@@ -264,14 +265,15 @@ class Limits:
 def locate(pusher: Pusher, state: PushState, until: float, direction: int, event: tuple[str, float]) -> PushStep:
     """Return the step that ends exactly at an event, found by false position and bisection in time.
 
-    A trial that goes beyond an interface may not converge, because A jumps there: it counts as beyond.
+    A trial that goes beyond an interface may not converge, because A jumps there, and one beyond a guide cannot be solved: it
+    counts as beyond.
     """
     kind, level = event
 
     def tried(time: float) -> tuple[PushStep | None, float]:
         try:
             step = pusher.step(state, time, None, direction)
-        except FloatingPointError:
+        except (FloatingPointError, np.linalg.LinAlgError, SingularMatrixError):
             return None, inf
         if kind == "reaches":
             return step, (step.state.depth - level) * direction

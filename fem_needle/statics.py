@@ -14,6 +14,7 @@ from fem_needle.plant import Operators, Plant, Points
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-13  # of the largest element force, by which nearly equal ones may miss each other
 FORCE_SUM_TOLERANCE = 1e-6  # of the largest single force: far above round-off, far below a wrong sign
 
 
@@ -81,7 +82,8 @@ def solve_static(plant: Plant, *, depth: float, time: float = 0.0) -> Equilibriu
         return _straight(plant, depth, time, case)
     operators, points = plant.operators(depth, time), plant.points(depth)
     coordinates, forces = static_state(plant, operators, points, case, depth=depth, time=time)
-    return check_force_sum(equilibrium(plant, depth, time, operators, points, coordinates, forces), points)
+    rounding = ROUNDING * float(np.max(np.abs(operators.stiffness)) * np.max(np.abs(coordinates)))
+    return check_force_sum(equilibrium(plant, depth, time, operators, points, coordinates, forces), points, rounding)
 
 
 def static_state(
@@ -156,13 +158,13 @@ def equilibrium(
     )
 
 
-def check_force_sum(rest: Equilibrium, points: Points) -> Equilibrium:
+def check_force_sum(rest: Equilibrium, points: Points, rounding: float = 0.0) -> Equilibrium:
     """Return the state if support, guides, loads and tissue balance.
 
     Raises
     ------
     ComputationError
-        If their sum exceeds ``FORCE_SUM_TOLERANCE`` of the largest of them.
+        If their sum exceeds ``FORCE_SUM_TOLERANCE`` of the largest of them, and ``rounding`` [N], what is lost in forming them.
     """
     if not rest.plant.prescribed:
         return rest  # without a clamp in the coordinates there is no support force to add up
@@ -170,7 +172,7 @@ def check_force_sum(rest: Equilibrium, points: Points) -> Equilibrium:
     lateral = rest.point_forces * (points.rows @ rest.plant.deflection_at_one)
     forces = [rest.hub_force, rest.tissue_force, *lateral]
     largest = max(abs(force) for force in forces)
-    if abs(sum(forces)) > FORCE_SUM_TOLERANCE * largest:
+    if abs(sum(forces)) > FORCE_SUM_TOLERANCE * largest + rounding:
         raise ComputationError(
             f"forces do not balance at time {rest.time:g} s, depth {rest.depth:g} m: their sum is {sum(forces):.3g} N, "
             f"the largest {largest:.3g} N; round-off: use fewer elements"

@@ -245,8 +245,9 @@ class DynamicStepper:
             instant = self._one_sided(law.before(until), middle) if node == 1.0 else law.after(time + node * length)
             if last is not None and last.stages[number].instant.depth == instant.depth:
                 earlier = last.stages[number]
-            # A node at the end belongs to this step: loads and layers just before a kink.
-            case = self._loads(middle, min(instant.time, latest), earlier)
+            # A node at the end belongs to this step: loads, swelling and layers just before a kink.
+            instant = replace(instant, time=min(instant.time, latest))
+            case = self._loads(middle, instant.time, earlier)
             earlier = evaluate_stage(self.plant, instant, case, earlier)
             found.append(earlier)
         if cut is not None and start.path is not None:
