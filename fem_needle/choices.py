@@ -1,4 +1,4 @@
-"""Automatic settings: which analysis, how many elements, which time step; and what they are estimated to cost in accuracy."""
+"""Automatic settings of any model: which analysis, which time step; and what they are estimated to cost in accuracy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
 from fem_needle.motion import PUSH_SLACK, depth_law, run_duration, shortest_period
-from fem_needle.needle import FiniteElementNeedle
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import run_limits
 from fem_needle.scene import Scene
@@ -27,10 +26,6 @@ from fem_needle.statics import solve_static
 
 Array = NDArray[np.float64]
 
-ELEMENT_CHOICES = (8, 12, 16, 24, 32, 48, 64, 96, 128)
-FEWEST_DYNAMIC_ELEMENTS = 16
-ELEMENT_SHARE = 0.1  # of the tolerance: what the mesh may cost
-PILOT_ELEMENTS = 8
 PILOT_INSTANTS = 7
 OUTPUTS = 200
 STEPS_PER_PERIOD = 16
@@ -59,8 +54,8 @@ class Choice:
     inertia_error: float
 
 
-def choose(scene: Scene, plant_with: Callable[[int], Plant]) -> Choice:
-    """Return analysis, output step and what is skipped; ``plant_with`` makes a plant with a number of elements."""
+def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
+    """Return analysis, output step and what is skipped; ``pilot`` makes a coarse plant, where one is needed."""
     numerics = scene.numerics
     duration = run_duration(scene)
     slack = PUSH_SLACK if scene.run.duration is None and scene.insertion.kind == "force" else 1.0
@@ -71,7 +66,7 @@ def choose(scene: Scene, plant_with: Callable[[int], Plant]) -> Choice:
     if analysis == "auto" and scene.insertion.kind == "force":
         analysis = "dynamic"
     if analysis == "auto":
-        effect = inertia_effect(plant_with(PILOT_ELEMENTS))
+        effect = inertia_effect(pilot())
         allowed = INERTIA_SHARE * numerics.tolerance
         analysis = "quasi-static" if effect <= allowed else "dynamic"
         if analysis == "quasi-static":
@@ -82,58 +77,11 @@ def choose(scene: Scene, plant_with: Callable[[int], Plant]) -> Choice:
     return Choice(analysis, step, skipped, effect if analysis == "quasi-static" else 0.0)
 
 
-def choose_elements(scene: Scene, analysis: str) -> tuple[int, float]:
-    """Return the fewest elements whose static tips agree with twice as many, and the difference that remains.
-
-    Compared at instants spread over the run; relative to the largest tip deflection among them.
-    """
-    fewest = FEWEST_DYNAMIC_ELEMENTS if analysis == "dynamic" else ELEMENT_CHOICES[0]
-    allowed = ELEMENT_SHARE * scene.numerics.tolerance
-    candidates = [count for count in ELEMENT_CHOICES if count >= fewest]
-    error = np.inf
-    for count in candidates:
-        error = mesh_error(scene, FiniteElementNeedle(scene, elements=count), 2 * count)
-        if error <= allowed:
-            return count, error
-    return candidates[-1], error
-
-
-def mesh_error(scene: Scene, plant: Plant, finer: int) -> float:
-    """Return the largest difference of static tips from those on a finer mesh, relative to the largest tip."""
-    return _tip_difference(scene, plant, FiniteElementNeedle(scene, elements=finer))
-
-
-def _tip_difference(scene: Scene, plant: Plant, finer: Plant) -> float:
+def tip_difference(scene: Scene, plant: Plant, finer: Plant) -> float:
+    """Return the largest difference of two plants' static tips over the run, relative to the largest of the finer one's."""
     coarse, fine = _static_tips(plant), _static_tips(finer)
     scale = max(float(np.max(np.abs(fine))), scene.numerics.absolute_tolerance)
     return float(np.max(np.abs(coarse - fine))) / scale
-
-
-def choose_mesh(scene: Scene, analysis: str) -> tuple[FiniteElementNeedle, float | None]:
-    """Return the needle on the mesh or with the elements that the scene gives or, on "auto", needs, and what that may cost.
-
-    The error is relative to the largest tip deflection; None where there is nothing finer to compare with.
-    """
-    numerics = scene.numerics
-    if numerics.mesh is None and numerics.elements == "auto":
-        count, error = choose_elements(scene, analysis)
-        return FiniteElementNeedle(scene, elements=count), error
-    plant = _given_mesh(scene, 1)
-    try:
-        finer = _given_mesh(scene, 2)
-    except SceneError:  # more elements than are allowed, or smaller ones
-        return plant, None
-    return plant, _tip_difference(scene, plant, finer)
-
-
-def _given_mesh(scene: Scene, parts: int) -> FiniteElementNeedle:
-    """Return the needle with every element of the scene's own mesh cut into one or two equal parts."""
-    numerics = scene.numerics
-    if numerics.mesh is None:
-        return FiniteElementNeedle(scene, elements=parts * int(numerics.elements))
-    nodes = np.array(numerics.mesh)
-    middles = 0.5 * (nodes[1:] + nodes[:-1])
-    return FiniteElementNeedle(scene, mesh=nodes if parts == 1 else np.sort(np.concatenate((nodes, middles))))
 
 
 def first_time_step(plant: Plant, analysis: str, output_step: float) -> float:

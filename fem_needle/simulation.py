@@ -11,12 +11,12 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem_needle.choices import Choice, choose, choose_mesh, first_time_step
+from fem_needle.choices import Choice, choose, first_time_step
 from fem_needle.collocation import collocation
 from fem_needle.errors import ComputationError
 from fem_needle.march import RunEnd, TimeGrid, march, time_grid
 from fem_needle.mesh_file import mesh_positions
-from fem_needle.needle import FiniteElementNeedle
+from fem_needle.models import ChosenPlant, model_family
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import march_pushed
 from fem_needle.samples import Sample
@@ -48,12 +48,15 @@ class Observer(Protocol):
 class _Job:
     """A plant, the scene with the settings of this run, what was chosen, and who watches."""
 
-    plant: Plant
+    chosen: ChosenPlant
     scene: Scene
     choice: Choice
-    mesh_error: float | None
     observer: Observer
     started: float
+
+    @property
+    def plant(self) -> Plant:
+        return self.chosen.plant
 
 
 class _Nobody:
@@ -89,7 +92,7 @@ def run_scene(
     scene
         What to run. Every other argument overrides its ``[model]`` or ``[numerics]`` value.
     model
-        "fem".
+        "fem", "assumed-modes" or another installed model.
     elements, degree
         Mesh; default: chosen from the tolerance.
     mesh
@@ -129,9 +132,9 @@ def run_scene(
     }
     scene = scene.with_values(overriding({path: value for path, value in values.items() if value is not None}))
     started = clock.perf_counter()
-    choice = choose(scene, lambda count: FiniteElementNeedle(scene, elements=count))
-    plant, error = choose_mesh(scene, choice.analysis)
-    return _run(_Job(plant, scene, choice, error, observer or _Nobody(), started))
+    family = model_family(scene.model.kind)
+    choice = choose(scene, lambda: family.pilot(scene))
+    return _run(_Job(family.choose(scene, choice.analysis), scene, choice, observer or _Nobody(), started))
 
 
 def simulate(
@@ -152,7 +155,8 @@ def simulate(
     }
     scene = plant.scene.with_values({path: value for path, value in values.items() if value is not None})
     started = clock.perf_counter()
-    return _run(_Job(plant, scene, choose(scene, lambda count: plant), None, observer or _Nobody(), started))
+    choice = choose(scene, lambda: plant)
+    return _run(_Job(ChosenPlant(plant, None), scene, choice, observer or _Nobody(), started))
 
 
 def _run(job: _Job) -> Trajectory:
@@ -284,7 +288,7 @@ def _trajectory(job: _Job, grid: TimeGrid, samples: list[Sample], time_error: fl
         | summary_of(run)
         | {
             "error_estimate": estimate,
-            "warnings": [],
+            "warnings": list(job.chosen.warnings),
             "stop_reason": end.reason,
             "steps": end.steps,
             "solve_time": now - job.started,
@@ -309,4 +313,5 @@ def _largest_step(grid: TimeGrid) -> float:
 
 def _total(job: _Job, time_error: float) -> float | None:
     """Return the sum of the estimated errors: time step, mesh, left-out inertia; None where the mesh was not checked."""
-    return None if job.mesh_error is None else time_error + job.mesh_error + job.choice.inertia_error
+    error = job.chosen.error
+    return None if error is None else time_error + error + job.choice.inertia_error

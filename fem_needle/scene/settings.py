@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import StrictBool, StrictStr, model_validator
 
 from fem_needle.scene.node_positions import NodePositions
 from fem_needle.scene.part import Mistake, Part, raise_mistakes
 from fem_needle.scene.quantity import Quantity
 
+FIXED_FRAME_VARIANTS = ("corrected", "as-printed")
 _STEP = Quantity("s", above=0.0, words=("auto",))
 
 
@@ -84,14 +85,42 @@ class Model(Part):
     Parameters
     ----------
     kind
-        ``"fem"``: finite elements.
+        ``"fem"``: finite elements; ``"assumed-modes"``: shapes of the whole needle; or another installed model.
     kinematics
         ``"material"``, or under the support entry ``"fixed-frame"``, the
         kinetic energy of the growing domain without convective terms.
+    modes
+        How many assumed modes.
+    variant
+        Of the assumed modes: ``"conservative"``; ``"corrected"``, the thesis' derivation done right, and ``"as-printed"``, its
+        appendix with its mistakes, both ``fixed-frame``.
+    basis
+        Assumed modes of the ``"full-length"`` or of the ``"inserted-length"``.
+    static_corrections
+        Whether the static responses to loads and hub motion join the assumed modes.
     """
 
-    kind: Literal["fem"] = "fem"
+    kind: StrictStr = "fem"
     kinematics: Literal["material", "fixed-frame"] = "material"
+    modes: Annotated[int, Quantity(at_least=1, at_most=200, integer=True)] = 2
+    variant: Literal["conservative", "corrected", "as-printed"] = "conservative"
+    basis: Literal["full-length", "inserted-length"] = "full-length"
+    static_corrections: StrictBool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _imply_kinematics(cls, data: Any) -> Any:
+        """The thesis' variants are fixed-frame where nothing else is said."""
+        if isinstance(data, Mapping) and data.get("variant") in FIXED_FRAME_VARIANTS and "kinematics" not in data:
+            return dict(data) | {"kinematics": "fixed-frame"}
+        return data
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.variant in FIXED_FRAME_VARIANTS and self.kinematics != "fixed-frame":
+            message = f"the variant '{self.variant}' is fixed-frame (got '{self.kinematics}'; allowed 'fixed-frame')"
+            raise_mistakes("Model", [Mistake("kinematics", message, self.kinematics)])
+        return self
 
 
 class Numerics(Part):

@@ -31,6 +31,7 @@ RANKS = {
     "manifest": 2,
     "tissue_block": 2,
     "plant": 2,
+    "models": 3,
     # parts of a model, and what needs only the protocol
     "axial": 3,
     "foundation": 3,
@@ -53,22 +54,23 @@ RANKS = {
     "skipping": 11,
     "trajectory": 11,
     "choices": 12,
+    "finite_element_model": 13,
     "series_file": 12,
     "vtk_export": 12,
     # whole runs
-    "simulation": 13,
-    "run_folder": 13,
+    "simulation": 14,
+    "run_folder": 14,
     "csv_file": 13,
     "matlab_file": 13,
     "vtkhdf_file": 13,
-    "export": 14,
-    "cli": 15,
-    "__main__": 16,
+    "export": 15,
+    "cli": 20,
+    "__main__": 21,
 }
 # A convenience of the result that reaches upward, when it is called and not before.
 LATE = {("trajectory", "run_folder")}
 # The rooms that may know a mesh: everything else must work with any plant.
-KNOW_A_MESH = {"elements", "frames", "foundation", "needle", "choices", "simulation"}
+KNOW_A_MESH = {"elements", "frames", "foundation", "needle", "finite_element_model"}
 MESH = {"elements", "frames", "foundation", "needle"}
 
 

@@ -108,17 +108,17 @@ def test_a_message_has_name_value_unit_and_range():
     assert "length\n  out of range (got '300 m'; allowed 0.0001 to 100 m)" in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("part", "keys"),
-    [
-        (Model, {"kind": "assumed-modes"}),
-        (Model, {"modes": 2}),
-        (Numerics, {"mesh": "file"}),
-    ],
-)
-def test_what_does_not_work_yet_is_no_key(part, keys):
+def test_a_mesh_file_needs_its_folder():
     with pytest.raises(ValidationError):
-        part(**keys)
+        Numerics(mesh="file")
+
+
+@pytest.mark.parametrize("variant", ["corrected", "as-printed"])
+def test_the_variants_of_the_thesis_imply_a_fixed_frame(variant):
+    assert Model(variant=variant).kinematics == "fixed-frame"
+    assert Model(variant=variant, kinematics="fixed-frame").kinematics == "fixed-frame"
+    with pytest.raises(ValidationError, match="is fixed-frame"):
+        Model(variant=variant, kinematics="material")
 
 
 @pytest.mark.parametrize("number", [np.float64(0.25), np.float32(0.25), "250 mm", 0.25])

@@ -1,0 +1,71 @@
+"""Models of a needle by name: each is an entry point of the group ``fem_needle.models``, in this package or in another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import metadata
+from typing import Protocol
+
+from fem_needle.errors import SceneError
+from fem_needle.plant import Plant
+from fem_needle.scene import Scene
+
+ENTRY_POINTS = "fem_needle.models"
+
+
+@dataclass(frozen=True, eq=False)
+class ChosenPlant:
+    """A plant for a run.
+
+    Attributes
+    ----------
+    plant
+        The model.
+    error
+        What its discretization may cost the tip, relative to the largest deflection; None where nothing finer was compared.
+    warnings
+        What a user should know before trusting it.
+    """
+
+    plant: Plant
+    error: float | None
+    warnings: tuple[str, ...] = ()
+
+
+class ModelFamily(Protocol):
+    """What an entry point of the group names: how plants of one kind are made of a scene."""
+
+    def pilot(self, scene: Scene) -> Plant:
+        """Return a coarse plant for estimates."""
+
+    def build(self, scene: Scene) -> Plant:
+        """Return the plant with the sizes that the scene gives, fixed defaults on "auto"."""
+
+    def choose(self, scene: Scene, analysis: str) -> ChosenPlant:
+        """Return the plant for a run, with the sizes that the tolerance needs on "auto", and its estimated error."""
+
+
+def model_family(kind: str) -> ModelFamily:
+    """Return the family of a ``model.kind``.
+
+    Raises
+    ------
+    SceneError
+        If no installed package has it.
+    """
+    found = metadata.entry_points(group=ENTRY_POINTS)
+    if kind not in found.names:
+        raise SceneError(f"model.kind: unknown model (got {kind!r}; allowed {', '.join(sorted(found.names))})")
+    family: ModelFamily = found[kind].load()
+    return family
+
+
+def build_plant(scene: Scene) -> Plant:
+    """Return the plant of ``scene.model.kind`` with the scene's sizes.
+
+    Raises
+    ------
+    SceneError
+        If the model is unknown or cannot have what the scene asks for.
+    """
+    return model_family(scene.model.kind).build(scene)
