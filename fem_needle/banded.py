@@ -48,23 +48,39 @@ def from_elements(local: Array, stride: int) -> Array:
     return band
 
 
+def add_square(band: Array, row: Array, factor: float) -> None:
+    """Add ``factor row row^T`` in place; what differs from zero in the row must fit the band."""
+    places = np.flatnonzero(row)
+    if len(places):
+        part = row[places[0] : places[-1] + 1]
+        add_local(band, int(places[0]), np.outer(factor * part, part))
+
+
 def from_dense(matrix: Array) -> Array:
     """Return the band storage of a dense matrix, every diagonal kept."""
     size = matrix.shape[0]
     band = zeros(size, size - 1)
-    for column in range(size):
-        band[size - 1 - column : 2 * size - 1 - column, column] = matrix[:, column]
+    _dense_view(band)[...] = matrix
     return band
 
 
 def to_dense(band: Array) -> Array:
-    """Return the dense matrix of a band array."""
+    """Return the dense matrix of a band array; a view, not to be written to, where the band is as wide as the matrix."""
     size, middle = band.shape[1], half_bandwidth(band)
+    if middle == size - 1 and band.flags.f_contiguous:
+        return _dense_view(band)
     dense = np.zeros((size, size))
     for column in range(size):
         first, last = max(0, column - middle), min(size, column + middle + 1)
         dense[first:last, column] = band[middle + first - column : middle + last - column, column]
     return dense
+
+
+def _dense_view(band: Array) -> Array:
+    """Return a full matrix inside its band storage: A[i, j] lies at offset b + i + 2 b j in memory."""
+    size, middle = band.shape[1], half_bandwidth(band)
+    flat = band.ravel(order="K")[middle:]
+    return np.lib.stride_tricks.as_strided(flat, (size, size), (flat.itemsize, 2 * middle * flat.itemsize))
 
 
 def multiply(band: Array, vector: Array) -> Array:

@@ -12,35 +12,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
-from fem_needle.elements.integrals import IntervalIntegrals, Kind, gauss_rule, interval_integrals
-from fem_needle.elements.mesh import LineMesh
 from fem_needle.frames import Frame
+from fem_needle.gauss import gauss_rule
 from fem_needle.path import CutPath
 from fem_needle.plant import RestTerms, no_rest_terms
 from fem_needle.scene import Layer
 from fem_needle.segments import Segment, inserted_segments
+from fem_needle.shapes import IntervalIntegrals, Kind, Shapes
 
 Array = NDArray[np.float64]
-
-PATH_POINTS = 4  # exact for a cubic piece of the path times a quartic shape
 
 
 @dataclass(frozen=True, eq=False)
 class Foundation:
-    """Layers on a mesh.
+    """Layers on shapes.
 
     Attributes
     ----------
     layers
         The tissue's layers.
-    mesh, frame
-        The mesh and where y lies on it.
+    shapes, frame
+        The functions w is made of, and where y lies on them.
     tip_stiffness
         Spring that travels with the tip [N/m].
     """
 
     layers: tuple[Layer, ...]
-    mesh: LineMesh
+    shapes: Shapes
     frame: Frame
     tip_stiffness: float = 0.0
     _mass: IntervalIntegrals = field(init=False)
@@ -48,9 +46,9 @@ class Foundation:
     _slip: IntervalIntegrals = field(init=False)
 
     def __post_init__(self) -> None:
-        kinds: tuple[Kind, ...] = ("mass", "drag", "slip") if self.is_damped else ("mass",)
+        kinds: tuple[Kind, ...] = ("mass", "drag", "slip") if self.is_damped and self.frame.power is not None else ("mass",)
         for kind in kinds:
-            object.__setattr__(self, f"_{kind}", interval_integrals(self.mesh, kind, self.frame.power))
+            object.__setattr__(self, f"_{kind}", self.shapes.interval_integrals(kind, self.frame.power or 0))
 
     @property
     def is_damped(self) -> bool:
@@ -66,35 +64,45 @@ class Foundation:
         """Return G(z) = sum k_i F_i(z)."""
         moduli = tuple(layer.foundation_modulus for layer in self.layers)
         band = self._sum(self._mass, moduli, depth, self.frame.stretch(depth))
-        band[self.mesh.half_bandwidth, -2] += self.tip_stiffness
+        if self.tip_stiffness:
+            banded.add_square(band, self._tip_row(depth), self.tip_stiffness)
         return band
+
+    def _tip_row(self, depth: float, derivative: int = 0) -> Array:
+        return self.shapes.row(self.frame.position(depth, depth), derivative)
 
     def stiffness_rate_product(self, coordinates: Array, depth: float) -> Array:
         """Return dG/dz q: what the moving ends of the segments add, and the stretch."""
         frame = self.frame
-        result = np.zeros(self.mesh.size)
+        result = self._tip_rate_product(coordinates, depth)
         if frame.stretch_rate:
-            result += (frame.stretch_rate / frame.stretch(depth)) * banded.multiply(
-                self.stiffness(depth), coordinates
-            )
-            # The tip spring does not stretch.
-            result[-2] -= frame.stretch_rate / frame.stretch(depth) * self.tip_stiffness * coordinates[-2]
+            moduli = tuple(layer.foundation_modulus for layer in self.layers)
+            layers = self._sum(self._mass, moduli, depth, frame.stretch_rate)
+            result += banded.multiply(layers, coordinates)
         for segment in inserted_segments(self.layers, depth):
             modulus = self.layers[segment.layer].foundation_modulus * frame.stretch(depth)
             for y, sign in ((segment.end, 1.0), (segment.start, -1.0)):
                 rate = sign * modulus * frame.position_rate(y, depth)
                 if rate:
-                    row = self.mesh.row(frame.position(y, depth))
+                    row = self.shapes.row(frame.position(y, depth))
                     result += rate * (row @ coordinates) * row
         return result
+
+    def _tip_rate_product(self, coordinates: Array, depth: float) -> Array:
+        """Return k_t d(psi psi)/dz q of the spring at the tip, which moves along shapes that do not move with it."""
+        moved = self.frame.position_rate(depth, depth)
+        if not (self.tip_stiffness and moved):
+            return np.zeros(self.shapes.size)
+        row, slope = self._tip_row(depth), self._tip_row(depth, 1)
+        return self.tip_stiffness * moved * (slope * (row @ coordinates) + row * (slope @ coordinates))
 
     def rest_terms(self, path: CutPath, depth: float, lower: float, upper: float) -> RestTerms:
         """Integrate the rest line exactly over lower <= y < upper.
 
-        Split at nodes, layers and the path's own pieces, four Gauss points on each part. With r at fixed y and x(y; z) the
+        Split at nodes, layers and the path's own pieces, Gauss points on each part. With r at fixed y and x(y; z) the
         place on the mesh, dH/dz = k r psi at the tip + integral k r psi' dx/dz dy; the tip counts where it lies in the range.
         """
-        total = no_rest_terms(self.mesh.size)
+        total = no_rest_terms(self.shapes.size)
         for segment in inserted_segments(self.layers, depth):
             modulus = self.layers[segment.layer].foundation_modulus
             start, end = max(segment.start, path.edges[0], lower), min(segment.end, upper)
@@ -102,8 +110,8 @@ class Foundation:
                 total = total + self._path_between(path, depth, modulus, start, end)
             if modulus and segment.ends_at_tip and lower <= depth < upper:
                 tip = float(path.value(np.array(depth)))
-                row = self.mesh.row(self.frame.position(depth, depth))
-                zero = np.zeros(self.mesh.size)
+                row = self.shapes.row(self.frame.position(depth, depth))
+                zero = np.zeros(self.shapes.size)
                 total = total + RestTerms(zero, modulus * tip * row, 0.0, 0.5 * modulus * tip**2)
         return total
 
@@ -112,29 +120,31 @@ class Foundation:
         rest = path.value(y)
         force = modulus * weights * rest
         x, moves = self.frame.positions(y, depth)
-        load, rate = self.mesh.weighted_sum(x, force), self.mesh.weighted_sum(x, force * moves, 1)
+        load, rate = self.shapes.weighted_sum(x, force), self.shapes.weighted_sum(x, force * moves, 1)
         return RestTerms(load, rate, 0.5 * float(force @ rest), 0.0)
 
     def _gauss_points(
         self, start: float, end: float, edges: Array, depth: float
     ) -> tuple[Array, Array]:
         """Return points [m] and weights over y from start to end, split at nodes and at the path's edges."""
-        stretch = self.frame.stretch(depth)
-        nodes = depth - stretch * (self.mesh.nodes[-1] - self.mesh.nodes)
+        nodes = self.frame.axis_positions(self.shapes.breaks, depth)
         cuts = np.unique(np.concatenate([[start, end], nodes, edges]))
         cuts = cuts[(cuts >= start) & (cuts <= end)]
-        points, weights = gauss_rule(PATH_POINTS)
+        points, weights = gauss_rule(self.shapes.quadrature_points)
         sizes = np.diff(cuts)[:, None]
         return (cuts[:-1, None] + sizes * points).ravel(), (sizes * weights).ravel()
 
-    def damping(self, depth: float) -> tuple[Array, Array, Array] | tuple[None, None, None]:
+    def damping(self, depth: float) -> tuple[Array | None, Array | None, Array | None]:
         """Return C, D, E of the viscosity on dw/dt at fixed y, or Nones without viscosity."""
         if not self.is_damped:
             return None, None, None
         viscosities = tuple(layer.damping for layer in self.layers)
         stretch = self.frame.stretch(depth)
+        resisting = self._sum(self._mass, viscosities, depth, stretch)
+        if self.frame.power is None:
+            return resisting, None, None
         return (
-            self._sum(self._mass, viscosities, depth, stretch),
+            resisting,
             self._sum(self._drag, viscosities, depth, -1.0),
             self._sum(self._slip, viscosities, depth, 1.0 / stretch),
         )
@@ -142,7 +152,7 @@ class Foundation:
     def _sum(
         self, integrals: IntervalIntegrals, factors: tuple[float, ...], depth: float, scale: float
     ) -> Array:
-        band = banded.zeros(self.mesh.size, self.mesh.half_bandwidth)
+        band = banded.zeros(self.shapes.size, self.shapes.half_bandwidth)
         for segment in inserted_segments(self.layers, depth):
             factor = factors[segment.layer]
             if factor:

@@ -30,13 +30,22 @@ class Frame(Protocol):
     def stretch(self, depth: float) -> float:
         """Return dy / d(position)."""
 
+    def axis_positions(self, places: Array, depth: float) -> Array:
+        """Return y [m] of places on the shapes, the inverse of `positions`."""
+
+    def places(self, arc_length: Array, length: float, depth: float) -> tuple[Array, float]:
+        """Return the places of stations of the part that bends, and how many metres a unit of place is."""
+
     @property
     def stretch_rate(self) -> float:
         """Return d(stretch)/dz."""
 
     @property
-    def power(self) -> int:
-        """Return p in dw/dt = psi q' - v x^p psi' q / stretch: the needle slides (0) or stretches (1) past the tissue."""
+    def power(self) -> int | None:
+        """Return p in dw/dt = psi q' - v x^p psi' q / stretch: the needle slides (0) or stretches (1) past the tissue.
+
+        None: the shapes rest with the tissue, dw/dt = psi q'.
+        """
 
 
 @dataclass(frozen=True)
@@ -45,11 +54,11 @@ class MaterialFrame:
 
     length: float
     stretch_rate: float = 0.0
-    power: int = 0
+    power: int | None = 0
 
     def position(self, y: float, depth: float) -> float:
         """Return s = y + (l - z) [m], kept on the needle."""
-        return min(max(y + (self.length - depth), 0.0), self.length)
+        return self.length if y >= depth else min(max(y + (self.length - depth), 0.0), self.length)
 
     def position_rate(self, y: float, depth: float) -> float:
         """Return -1, or 0 at the tip, which moves with the mesh."""
@@ -63,17 +72,25 @@ class MaterialFrame:
         """Return 1."""
         return 1.0
 
+    def axis_positions(self, places: Array, depth: float) -> Array:
+        """Return y = s - (l - z) [m]."""
+        return depth - (self.length - places)
+
+    def places(self, arc_length: Array, length: float, depth: float) -> tuple[Array, float]:
+        """Return s and 1."""
+        return arc_length, 1.0
+
 
 @dataclass(frozen=True)
 class StretchedFrame:
     """Fraction of the depth."""
 
     stretch_rate: float = 1.0
-    power: int = 1
+    power: int | None = 1
 
     def position(self, y: float, depth: float) -> float:
         """Return xi = y / z."""
-        return min(max(y / depth, 0.0), 1.0)
+        return 1.0 if y >= depth else max(y / depth, 0.0)
 
     def position_rate(self, y: float, depth: float) -> float:
         """Return -xi / z, or 0 at the tip."""
@@ -86,3 +103,11 @@ class StretchedFrame:
     def stretch(self, depth: float) -> float:
         """Return z [m]."""
         return depth
+
+    def axis_positions(self, places: Array, depth: float) -> Array:
+        """Return y = xi z [m], rounded as counted from the tip."""
+        return depth - depth * (1.0 - places)
+
+    def places(self, arc_length: Array, length: float, depth: float) -> tuple[Array, float]:
+        """Return xi = 1 + (s - l) / z and z."""
+        return 1 + (arc_length - length) / depth, depth

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
 from fem_needle.elements.mesh import LineMesh
+from fem_needle.gauss import gauss_rule
+from fem_needle.shapes import Kind
 
 Array = NDArray[np.float64]
-Kind = Literal["mass", "drag", "slip", "bending"]
 
 # psi_i psi_j, psi_i x psi_j' and x^2 psi_i' psi_j' have degree 10 at most: six points are exact, also on a part of an element.
 _POINTS = 6
@@ -122,10 +121,3 @@ def _element_matrices(mesh: LineMesh, kind: Kind, power: int) -> Array:
             + lengths**2 * reference.slip[2]
         )
     return moments * scales / lengths
-
-
-@lru_cache
-def gauss_rule(count: int) -> tuple[Array, Array]:
-    """Return points and weights on 0..1."""
-    points, weights = np.polynomial.legendre.leggauss(count)
-    return (points + 1) / 2, weights / 2

@@ -13,6 +13,8 @@ RANKS = {
     "banded": 0,
     "collocation": 0,
     "frames": 0,
+    "gauss": 0,
+    "shapes": 0,
     "path": 0,
     "shipped": 0,
     "atomic_file": 0,
@@ -35,11 +37,13 @@ RANKS = {
     # parts of a model, and what needs only the protocol
     "axial": 3,
     "foundation": 3,
+    "beam_matrices": 4,
+    "beam_needle": 5,
     "loads": 3,
     "free_response": 3,
     "run_target": 3,
     "rigid_push": 4,
-    "needle": 4,
+    "needle": 6,
     "motion": 5,
     "statics": 4,
     # time: stages, ledger, steps, the loop; no mesh
@@ -70,8 +74,8 @@ RANKS = {
 # A convenience of the result that reaches upward, when it is called and not before.
 LATE = {("trajectory", "run_folder")}
 # The rooms that may know a mesh: everything else must work with any plant.
-KNOW_A_MESH = {"elements", "frames", "foundation", "needle", "finite_element_model"}
-MESH = {"elements", "frames", "foundation", "needle"}
+KNOW_A_MESH = {"elements", "needle", "finite_element_model"}
+MESH = {"elements", "needle"}
 
 
 def room(module):

@@ -1,0 +1,63 @@
+"""What a beam needs of the functions that its deflection is made of: finite elements, modes, or anything else on a line.
+
+w = sum_i psi_i(x) q_i, with x a place on the line of the shapes (`frames` says where y lies on it). Matrices are in band storage.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Kind = Literal["mass", "drag", "slip", "bending"]
+
+
+class IntervalIntegrals(Protocol):
+    """Integrals of one product of shapes over any interval.
+
+    ``mass``: psi_i psi_j; ``drag``: x^p psi_i psi_j'; ``slip``: x^(2 p) psi_i' psi_j'; ``bending``: psi_i'' psi_j''; p is 0 or 1.
+    """
+
+    @property
+    def band(self) -> Array:
+        """The integrals over the whole line, band storage."""
+
+    def add(self, start: float, end: float, factor: float, target: Array) -> None:
+        """Add ``factor`` times the integral from ``start`` to ``end`` to a band matrix, in place."""
+
+
+class Shapes(Protocol):
+    """Functions on a line."""
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates, those of the clamped end included."""
+
+    @property
+    def half_bandwidth(self) -> int:
+        """Half-bandwidth of every matrix of products of shapes."""
+
+    @property
+    def breaks(self) -> Array:
+        """Rising places between which `quadrature_points` Gauss points integrate a shape times a cubic."""
+
+    @property
+    def quadrature_points(self) -> int:
+        """Number of Gauss points on each piece between breaks."""
+
+    def row(self, position: float, derivative: int = 0) -> Array:
+        """Return the row (size,) that maps coordinates to the value, or a derivative, at a place."""
+
+    def weighted_sum(self, positions: Array, weights: Array, derivative: int = 0) -> Array:
+        """Return the sum over places of weight times shape, or derivative of it, for every coordinate (size,)."""
+
+    def evaluate(self, coordinates: Array, positions: Array, derivative: int = 0) -> Array:
+        """Return values (..., places) of functions with coordinates (..., size), or of a derivative."""
+
+    def interval_integrals(self, kind: Kind, power: int = 0) -> IntervalIntegrals:
+        """Return the integrals of a product of shapes."""
+
+    def straight(self, deflection: float, angle: float) -> Array:
+        """Return the coordinates of deflection + angle x."""
