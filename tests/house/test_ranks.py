@@ -51,6 +51,8 @@ RANKS = {
     "guided_motion": 6,
     "linear_model": 6,
     "linearization": 7,
+    "modal_form": 7,
+    "controllability": 0,
     # time: stages, ledger, steps, the loop; no mesh
     "stages": 6,
     "ledger": 7,
@@ -73,6 +75,16 @@ RANKS = {
     "matlab_file": 13,
     "vtkhdf_file": 13,
     "export": 15,
+    # studies of a scene
+    "pictures": 0,
+    "richardson": 0,
+    "theoretical_order": 3,
+    "study_files": 4,
+    "exact_reference": 6,
+    "refinement": 15,
+    "convergence_rows": 16,
+    "convergence": 17,
+    "convergence_picture": 18,
     "cli": 20,
     "__main__": 21,
 }
