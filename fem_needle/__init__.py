@@ -13,6 +13,8 @@ _HOMES = {
     "suspicious": "fem_needle.checks",
     "run_scene": "fem_needle.simulation",
     "simulate": "fem_needle.simulation",
+    "converge": "fem_needle.convergence",
+    "ConvergenceStudy": "fem_needle.convergence",
     "FiniteElementNeedle": "fem_needle.needle",
     "solve_static": "fem_needle.statics",
     "Trajectory": "fem_needle.trajectory",

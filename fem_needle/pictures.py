@@ -1,0 +1,50 @@
+"""The style that all pictures share: size, fonts, colors that color-blind readers tell apart."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from io import BytesIO
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+WIDTH, HEIGHT = 7.0, 4.6  # inches
+DOTS_PER_INCH = 120
+INK = "#303030"
+# Okabe and Ito, in the order of use: blue, vermilion, bluish green, reddish purple, orange, sky blue.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MARKERS = ("o", "s", "^", "D", "v", "P")
+STYLE: Any = {
+    "font.size": 10.0,
+    "axes.titlesize": 11.0,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#d8d8d8",
+    "grid.linewidth": 0.6,
+    "legend.framealpha": 1.0,
+    "lines.linewidth": 1.8,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+}
+
+
+def new_figure(width: float = WIDTH, height: float = HEIGHT) -> Figure:
+    """Return an empty figure [inches] that lays its parts out by itself; draw inside ``shared_style()``."""
+    return Figure(figsize=(width, height), dpi=DOTS_PER_INCH, layout="constrained")
+
+
+def shared_style() -> AbstractContextManager[None]:
+    """Return the context manager in which pictures are drawn and saved."""
+    return mpl.rc_context(STYLE)
+
+
+def png_bytes(figure: Figure) -> bytes:
+    """Return a figure as PNG, the same bytes for the same figure."""
+    content = BytesIO()
+    with shared_style():
+        figure.savefig(content, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    return content.getvalue()
