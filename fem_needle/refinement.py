@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -81,9 +83,9 @@ class Level:
     shape
         Deflection along the needle at the end [m], shape (stations,).
     round_off
-        Of the tip, relative to its largest deflection over the run.
+        Of the tip, relative to its largest deflection over the run; of an integrated run times the root of the steps.
     solve_time
-        [s].
+        To make the model and to solve it [s].
     """
 
     value: float
@@ -136,18 +138,20 @@ def levels_of(setting: Setting, values: Sequence[float]) -> tuple[Level, ...]:
     family = model_family(setting.scene.model.kind)
     if setting.over == "time-step":
         plant = family.choose(setting.scene, setting.analysis).plant
-        levels = tuple(solve_level(replace(setting, time_step=value), plant, value) for value in values)
+        levels = tuple(solve_level(replace(setting, time_step=value), lambda: plant, value) for value in values)
     else:
         path = PATHS[setting.over]
         scenes = [setting.scene.with_values(overriding({path: value})) for value in values]
-        levels = tuple(solve_level(setting, family.build(scene), value) for scene, value in zip(scenes, values, strict=True))
+        makers = [partial(family.build, scene) for scene in scenes]
+        levels = tuple(solve_level(setting, make, value) for make, value in zip(makers, values, strict=True))
     _refuse_equal(setting, levels)
     return levels
 
 
-def solve_level(setting: Setting, plant: Plant, value: float) -> Level:
-    """Return the answer of one discretization."""
-    started = clock.perf_counter()
+def solve_level(setting: Setting, make: Callable[[], Plant], value: float) -> Level:
+    """Return the answer of one discretization; ``make`` makes its model."""
+    started, steps = clock.perf_counter(), 1
+    plant = make()
     if setting.times is not None:
         times, tips, shape = _equilibria(setting.scene, setting.times, plant)
         size = 1.0 / value
@@ -155,15 +159,17 @@ def solve_level(setting: Setting, plant: Plant, value: float) -> Level:
         run = simulate(plant, time_step=setting.time_step, analysis=setting.analysis, output_step=setting.output_step)
         times, tips, shape = run.time, run.tip_deflection, run.station_deflection[-1]
         size = float(run.summary["time_step"]) if setting.over == "time-step" else 1.0 / value
+        steps = int(run.summary["steps"])
     seconds = clock.perf_counter() - started
-    return Level(value, size, plant, times, tips, shape, _largest_round_off(setting.scene, plant, times, tips), seconds)
+    floor = sqrt(steps) * _largest_round_off(setting.scene, plant, times, tips)  # the steps' round-off adds up as a random walk
+    return Level(value, size, plant, times, tips, shape, floor, seconds)
 
 
 def finer_otherwise(setting: Setting, finest: Level) -> Level | None:
     """Return the finest row once more with what is held fixed made finer by two; None where that is impossible."""
     if setting.over != "time-step":
         halved = replace(setting, time_step=0.5 * float(setting.time_step or 0.0))
-        return solve_level(halved, finest.plant, finest.value)
+        return solve_level(halved, lambda: finest.plant, finest.value)
     key, count = size_of(finest.plant)
     if not key:
         return None
@@ -171,7 +177,7 @@ def finer_otherwise(setting: Setting, finest: Level) -> Level | None:
         plant = model_family(setting.scene.model.kind).build(setting.scene.with_value(PATHS[key], 2 * count))
     except SceneError:
         return None
-    return solve_level(replace(setting, time_step=finest.value), plant, finest.value)
+    return solve_level(replace(setting, time_step=finest.value), lambda: plant, finest.value)
 
 
 def size_of(plant: Plant) -> tuple[str, int]:

@@ -65,7 +65,8 @@ def _held(study: ConvergenceStudy) -> str:
     shown = {"analysis": study.analysis} | study.held
     parts = [f"{name.replace('_', ' ')} {_shown(name, value)}" for name, value in shown.items()]
     if study.held_error is not None:
-        parts.append(f"making that finer changes the finest row by {study.held_error:.1e}")
+        finer = "half the time step changes" if study.over != "time-step" else "a model of twice the size changes"
+        parts.append(f"{finer} the finest row by {study.held_error:.1e}")
     return ", ".join(parts)
 
 
