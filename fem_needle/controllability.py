@@ -136,8 +136,8 @@ class OutputTest:
 def balance(A: ArrayLike, B: ArrayLike, C: ArrayLike) -> Balanced:
     """Scale states, inputs and outputs so that no unit shows.
 
-    States by powers of two that make the rows and columns of A equally large (LAPACK ``gebal``), then every group of states that A
-    couples as a whole, so that inputs reach it as much as outputs see it; a group without inputs or outputs stays as it is.
+    States by powers of two that make the rows and columns of A equally large (LAPACK ``gebal``), then every group of states that
+    A couples as a whole, so that inputs reach it as much as outputs see it; a group without inputs or outputs stays as it is.
 
     Raises
     ------

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 RELATIVE_STEP = 3e-4  # of the depth
 POINTS = 4  # beside the depth itself, on one side
+ROUNDING = 1e-14  # of a value, which an evaluation may miss; a rate that is no more than this is none
 FINE = np.array([-25.0, 48.0, -36.0, 16.0, -3.0]) / 12.0  # order 4
 COARSE = np.array([-11.0, 18.0, -9.0, 2.0, 0.0]) / 6.0  # order 3
 
@@ -56,6 +57,8 @@ def _one_sided(function: Callable[[float], Array | float], depth: float, room: f
     step = float(np.copysign(2.0 ** floor(log2(size)), room))
     values = np.stack([np.asarray(function(depth + number * step)) for number in range(POINTS + 1)])
     rate = np.tensordot(FINE, values, axes=1) / step
+    noise = ROUNDING * np.max(np.abs(values), axis=0) / abs(step)
+    rate = np.where(np.abs(rate) > noise, rate, 0.0)
     return rate, float(np.max(np.abs(rate - np.tensordot(COARSE, values, axes=1) / step), initial=0.0))
 
 

@@ -34,7 +34,7 @@ def linearize(
     plant
         Any model of a needle.
     depth
-        z [m], above 0, at most the needle's length; the shallower side at an interface.
+        z [m], above 0, at most where the hub meets skin, guide or lateral load; the shallower side at an interface.
     time
         Instant [s] whose loads, hub and stiffness factor act, frozen.
     speed
@@ -63,8 +63,6 @@ def linearize(
     point = operating_point(plant, depth=depth, time=time, speed=speed)
     motion = small_motion(plant, point, moves=moves)
     guides = guided(motion, plant.prescribed)
-    if speed and len(guides.constraints):
-        raise SceneError(f"speed: a needle moves in rigid guides (got {speed:g} m/s; allowed 0, or guides with a stiffness)")
     motion = _with_springs(motion, guides)
     given = plant.prescribed if plant.scene.support.kind == "hub" else 0
     chosen = independent_coordinates(guides.constraints, plant.prescribed, moves=moves)
@@ -73,6 +71,12 @@ def linearize(
     outputs = _output_matrices(rows, guides, chosen.free, chosen.given[:, :given], parts, moves=moves)
     names = _Names(plant.scene, chosen.free.shape[1] - moves, moves, given)
     return _model(names, point, replace(parts, rows=outputs[0], direct=outputs[1]), tuple(rows.names))
+
+
+def lateral_inputs(plant: Plant) -> tuple[Signal, ...]:
+    """Return the inputs of a needle at a held depth: lateral loads, torque of a free hub, tip force, the hub's motion."""
+    given = plant.prescribed if plant.scene.support.kind == "hub" else 0
+    return _Names(plant.scene, 0, False, given).inputs
 
 
 def with_lateral_force(scene: Scene, position: float) -> Scene:
@@ -90,15 +94,23 @@ def with_lateral_force(scene: Scene, position: float) -> Scene:
     return Scene.from_dict(data | {"loads": loads})
 
 
+def reach(scene: Scene) -> float:
+    """Return the largest depth [m] at which the hub has met neither guide nor lateral load."""
+    loads = [load.position for load in scene.loads if isinstance(load, LateralLoad)]
+    return scene.needle.length + min([0.0, *loads, *(guide.position for guide in scene.support.guides)])
+
+
 def _check(plant: Plant, depth: float, speed: float, axial: str) -> None:
     mistakes = []
-    least, length = plant.smallest_depth, plant.scene.needle.length
+    least, length = plant.smallest_depth, reach(plant.scene)
     if not (0.0 < depth <= length and depth >= least):
         mistakes.append(f"depth: out of range (got {depth:g} m; allowed above {least:g} to {length:g} m)")
     if not np.isfinite(speed):
         mistakes.append(f"speed: is not finite (got {speed:g} m/s; allowed any finite number)")
     if axial not in {"free", "held"}:
         mistakes.append(f"axial: is not a choice (got {axial!r}; allowed 'free', 'held')")
+    if speed and any(guide.stiffness == "rigid" for guide in plant.scene.support.guides):
+        mistakes.append(f"speed: a needle moves in rigid guides (got {speed:g} m/s; allowed 0, or guides with a stiffness)")
     if plant.scene.tissue.rest_line != "straight":
         message = "remembers where the tip was and has no linear model"
         mistakes.append(f"tissue.rest_line: {message} (got {plant.scene.tissue.rest_line!r}; allowed 'straight')")

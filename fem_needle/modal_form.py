@@ -77,8 +77,16 @@ def _vibrations(parts: SecondOrder, lateral: Array) -> tuple[Array, Array]:
     except np.linalg.LinAlgError:
         raise ComputationError("the lateral stiffness is not positive: the needle has no vibrations there") from None
     order = np.argsort(-inverse)
-    inverse = inverse[order]
-    return 1.0 / inverse, shapes[:, order] / np.sqrt(inverse)
+    inverse, shapes = inverse[order], shapes[:, order]
+    upward = np.where(parts.rows[0, lateral] @ shapes < 0.0, -1.0, 1.0)  # every shape with its tip at positive deflections
+    return 1.0 / inverse, shapes * upward / np.sqrt(inverse)
+
+
+def lateral_frequencies(model: LinearModel) -> Array:
+    """Return the undamped natural frequencies of the lateral motion at a held depth [rad/s], rising."""
+    half = len(model.states) // 2
+    lateral = np.array([signal.name not in AXIAL for signal in model.states[:half]])
+    return np.asarray(np.sqrt(_vibrations(model.second_order, lateral)[0]))
 
 
 def _symmetric(matrix: Array) -> Array:

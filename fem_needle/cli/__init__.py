@@ -15,7 +15,13 @@ import typer
 
 from fem_needle.errors import NeedleError, SceneError
 
-GROUPS = ("fem_needle.cli.scene_commands", "fem_needle.cli.run", "fem_needle.cli.export", "fem_needle.cli.converge")
+GROUPS = (
+    "fem_needle.cli.scene_commands",
+    "fem_needle.cli.run",
+    "fem_needle.cli.export",
+    "fem_needle.cli.converge",
+    "fem_needle.cli.analyze",
+)
 ENTRY_POINTS = "fem_needle.commands"
 
 WRONG_INPUT = 2

@@ -52,6 +52,10 @@ RANKS = {
     "linear_model": 6,
     "linearization": 7,
     "modal_form": 7,
+    "depth_gains": 8,
+    "analysis": 9,
+    "analysis_picture": 10,
+    "analysis_matlab": 10,
     "controllability": 0,
     # time: stages, ledger, steps, the loop; no mesh
     "stages": 6,

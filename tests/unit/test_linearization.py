@@ -302,7 +302,7 @@ def test_undamped_poles_are_the_roots_of_the_eigenproblem():
     ("changes", "message"),
     [
         ({"depth": 0.0}, "depth"),
-        ({"depth": 0.3}, "0.2 m"),
+        ({"depth": 0.19}, "0.1877 m"),
         ({"speed": np.inf}, "speed"),
         ({"axial": "loose"}, "'held'"),
     ],

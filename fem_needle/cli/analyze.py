@@ -1,0 +1,130 @@
+"""The command `analyze`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fem_needle.cli.scene_commands import SceneArgument
+from fem_needle.errors import SceneError
+
+if TYPE_CHECKING:
+    from fem_needle.scene import Scene
+    from fem_needle.study_files import StudyFolder
+
+NAME = "analyze"
+RUNS = Path("runs")
+
+Text = str | None
+
+Depths = Annotated[
+    list[str] | None, typer.Option(metavar="DEPTH", help="Depth such as 50mm; may be repeated; by default the scene's.")
+]
+Held = Annotated[str, typer.Option(metavar="KIND", help="free: depth and speed are states; held: they are given.")]
+Speed = Annotated[str, typer.Option(metavar="SPEED", help="Of the insertion at the operating point, such as 10mm/s.")]
+Time = Annotated[str, typer.Option(metavar="TIME", help="At which the scene's loads are taken, such as 5s.")]
+Position = Annotated[Text, typer.Option(metavar="Y", help="Adds a lateral force at y as an input, such as -5mm.")]
+Folder = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder; by default runs/<name>-analyze, then with -2, ...")]
+Assignments = Annotated[
+    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the scene; may be repeated.")
+]
+
+
+def register(application: typer.Typer) -> None:
+    """Add the command."""
+    application.command(NAME)(analyze)
+
+
+def analyze(
+    scene: SceneArgument,
+    depth: Depths = None,
+    axial: Held = "free",
+    speed: Speed = "0 m/s",
+    time: Time = "0 s",
+    lateral_position: Position = None,
+    out: Folder = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the analysis in DIR.")] = False,
+    model: Annotated[Text, typer.Option(metavar="KIND", help="fem, assumed-modes or another installed model.")] = None,
+    elements: Annotated[Text, typer.Option(metavar="N", help="Elements over the part that bends; auto: 16.")] = None,
+    modes: Annotated[Text, typer.Option(metavar="N", help="How many assumed modes.")] = None,
+    variant: Annotated[Text, typer.Option(metavar="NAME", help="Of the assumed modes.")] = None,
+    basis: Annotated[Text, typer.Option(metavar="NAME", help="Of the assumed modes.")] = None,
+    assignments: Assignments = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print analyze.json and nothing else.")] = False,
+) -> None:
+    """Linearize a needle at depths: frequencies, gains and their signs, what can be controlled and seen.
+
+    Example: fem-needle analyze brachytherapy --depth 50mm --depth 100mm
+    """
+    from fem_needle.cli.settings import changed
+    from fem_needle.linearization import with_lateral_force
+    from fem_needle.run_target import RunTarget
+    from fem_needle.scene_file import load_scene
+    from fem_needle.study_files import StudyFolder
+
+    options = {
+        "model.kind": model,
+        "model.modes": modes,
+        "model.variant": variant,
+        "model.basis": basis,
+        "numerics.elements": elements,
+    }
+    loaded = changed(load_scene(scene), assignments or (), options)
+    if lateral_position is not None:
+        loaded = with_lateral_force(loaded, _number("--lateral-position", lateral_position, "m"))
+    wanted = _wanted(depth, time, speed) | {"axial": axial}
+    path = RUNS / f"{Path(scene).stem}-{NAME}" if out is None else out
+    _analyze(loaded, wanted, StudyFolder(NAME, RunTarget(path, force, numbered=out is None)), quiet=as_json)
+
+
+def _wanted(depth: list[str] | None, time: str, speed: str) -> dict[str, Any]:
+    """Return depths, time and speed in SI."""
+    depths = None if depth is None else [_number("--depth", text, "m") for text in depth]
+    return {"depths": depths, "time": _number("--time", time, "s"), "speed": _number("--speed", speed, "m/s")}
+
+
+def _number(option: str, text: str, unit: str) -> float:
+    """Return a number in SI, or with a unit.
+
+    Raises
+    ------
+    SceneError
+        If it is none.
+    """
+    from fem_needle.scene import units
+
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    try:
+        return units.to_si(text, unit)
+    except ValueError as error:
+        raise SceneError(f"{option}: {error} (got {text!r}; allowed a number of {unit}, or one with a unit)") from None
+
+
+def _analyze(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet: bool) -> None:
+    """Compute, write and show an analysis."""
+    from fem_needle.analysis import analyze as compute
+    from fem_needle.analysis_matlab import analysis_matlab
+    from fem_needle.analysis_picture import analysis_picture
+    from fem_needle.atomic_file import json_bytes, write_atomically
+    from fem_needle.cli.analyze_table import show_analysis
+
+    folder.check()
+    analysis = compute(scene, **wanted)
+    plain = analysis.to_dict()
+    written = folder.write(scene, plain, analysis.columns(), analysis_picture(analysis))
+    write_atomically(written / f"{NAME}.mat", analysis_matlab(analysis))
+    if quiet:
+        typer.echo(json_bytes(plain).decode(), nl=False)
+    else:
+        show_analysis(analysis, _short(written))
+
+
+def _short(folder: Path) -> Path:
+    here = Path.cwd()
+    return folder.relative_to(here) if folder.is_relative_to(here) else folder
+
