@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 MILLISECONDS = 1e3
 LABELS = {"elements": "elements", "modes": "modes", "time-step": "time step [ms]"}
 BESIDE = 0.3  # of the errors: where the slope of theory is drawn, so that neither line hides the other
+GRAY = "#808080"
 _LONGEST_TITLE = 70
 
 
@@ -80,12 +81,15 @@ def _draw_theory(axes: Axes, study: ConvergenceStudy) -> None:
 
 
 def _draw_floor(axes: Axes, study: ConvergenceStudy) -> None:
-    """Draw the round-off where it holds a row up."""
+    """Draw the round-off, and what the held discretization costs, where they hold a row up."""
+    if study.held_error and any(row.note.startswith("limited") for row in study.rows):
+        label = "finer elements change" if study.over == "time-step" else "half the time step changes"
+        axes.axhline(study.held_error, color=GRAY, linestyle="-.", linewidth=1.3, label=label, zorder=2)
     if not any(row.note == ROUND_OFF for row in study.rows):
         return
     places = [_place(study, row) for row in study.rows]
     floors = [row.round_off for row in study.rows]
-    axes.plot(places, floors, color="#808080", linestyle=":", linewidth=1.3, label="round-off", zorder=2)
+    axes.plot(places, floors, color=GRAY, linestyle=":", linewidth=1.3, label="round-off", zorder=2)
 
 
 def _label(axes: Axes, study: ConvergenceStudy) -> None:

@@ -46,5 +46,5 @@ def png_bytes(figure: Figure) -> bytes:
     """Return a figure as PNG, the same bytes for the same figure."""
     content = BytesIO()
     with shared_style():
-        figure.savefig(content, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+        figure.savefig(content, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None}, pil_kwargs={"optimize": True})
     return content.getvalue()

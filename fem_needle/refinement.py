@@ -149,7 +149,13 @@ def levels_of(setting: Setting, values: Sequence[float]) -> tuple[Level, ...]:
 
 
 def solve_level(setting: Setting, make: Callable[[], Plant], value: float) -> Level:
-    """Return the answer of one discretization; ``make`` makes its model."""
+    """Return the answer of one discretization; ``make`` makes its model.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Also where the run itself would end in order.
+    """
     started, steps = clock.perf_counter(), 1
     plant = make()
     if setting.times is not None:
@@ -157,6 +163,8 @@ def solve_level(setting: Setting, make: Callable[[], Plant], value: float) -> Le
         size = 1.0 / value
     else:
         run = simulate(plant, time_step=setting.time_step, analysis=setting.analysis, output_step=setting.output_step)
+        if run.summary["stop_reason"] == "interrupted":  # half a run must not pass for a row
+            raise KeyboardInterrupt
         times, tips, shape = run.time, run.tip_deflection, run.station_deflection[-1]
         size = float(run.summary["time_step"]) if setting.over == "time-step" else 1.0 / value
         steps = int(run.summary["steps"])
@@ -249,4 +257,4 @@ def _refuse_equal(setting: Setting, levels: Sequence[Level]) -> None:
         raise SceneError(f"values: two time steps are the same ({found}; {limits}: use shorter steps or a longer output step)")
     if setting.over != "time-step" and len({level.plant.size for level in levels}) == 1:
         kind = setting.scene.model.kind
-        raise SceneError(f"over: got {setting.over!r}; the model {kind!r} does not change with it")
+        raise SceneError(f"over: got {setting.over!r}; the model {kind!r} does not change with it, another may (model)")

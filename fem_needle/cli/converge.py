@@ -75,11 +75,14 @@ def converge(
 def _study(scene: Scene, over: str, values: str | None, folder: StudyFolder, *, quiet: bool) -> ConvergenceStudy:
     """Compute, write and show a study."""
     from fem_needle.atomic_file import json_bytes
+    from fem_needle.checks import suspicious
     from fem_needle.cli.converge_table import show_study
     from fem_needle.convergence import converge as compute
     from fem_needle.convergence_picture import convergence_picture
 
     folder.check()
+    for message in suspicious(scene):
+        typer.echo(f"warning: {message}", err=True)
     study = compute(scene, over, None if values is None else _numbers(over, values))  # type: ignore[arg-type]
     written = folder.write(scene, study.to_dict(), study.columns(), convergence_picture(study))
     if quiet:

@@ -148,6 +148,12 @@ def test_a_run_is_never_replaced_by_a_study(converge, tmp_path):
     assert "holds a run" in err
 
 
+def test_suspicious_values_are_told(converge):
+    status, _, err = converge("bench-s", "--values", "1,2", "--set", "loads.0.force=5")
+    assert status == 0
+    assert "warning: the tip force 5 N bends the needle" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

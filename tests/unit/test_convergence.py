@@ -7,7 +7,7 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from fem_needle import ConvergenceStudy, SceneError, converge, load_scene
+from fem_needle import ConvergenceStudy, SceneError, converge, load_scene, simulate
 from fem_needle.convergence_rows import RowMaker, best_reference, gathered
 from fem_needle.exact_reference import ExactReference
 from fem_needle.refinement import Level
@@ -166,3 +166,20 @@ def test_time_steps_that_the_outputs_make_equal_are_refused():
     scene = load_scene("bench-d").with_value("run.duration", 1e-3)
     with pytest.raises(SceneError, match=r"values: two time steps are the same \(0\.001 s gives 0\.0001 s"):
         converge(scene, "time-step", (1e-3, 1e-4), elements=2)
+
+
+def test_an_interrupted_run_is_no_row(monkeypatch):
+    """A run that is interrupted ends in order; a study of it would compare half a run with whole ones."""
+    scene = load_scene("bench-d").with_value("run.duration", 1e-3)
+    interrupted = []
+
+    def interrupt(*arguments, **options):
+        run = simulate(*arguments, **options)
+        run.summary["stop_reason"] = "interrupted"
+        interrupted.append(run)
+        return run
+
+    monkeypatch.setattr("fem_needle.refinement.simulate", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        converge(scene, values=(1, 2), time_step=1e-4)
+    assert len(interrupted) == 1
