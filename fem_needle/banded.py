@@ -145,3 +145,28 @@ class Factorization:
         if not np.all(np.isfinite(solution)):
             raise SingularMatrixError("the solution is not finite")
         return solution
+
+
+class RestrictedFactorization:
+    """A matrix seen from a subspace: solves V^T A V y = V^T b and returns x = V y.
+
+    For coordinates that are nearly dependent: directions outside the columns V (size, rank) are left at zero.
+
+    Raises
+    ------
+    SingularMatrixError
+        If the restricted matrix is singular or not finite.
+    """
+
+    def __init__(self, band: Array, columns: Array) -> None:
+        self._columns = columns
+        self._factorization = Factorization(from_dense(columns.T @ to_dense(band) @ columns))
+
+    def solve(self, right: Array) -> Array:
+        """Solve for one right-hand side ``(n,)`` or several ``(n, m)``."""
+        return np.asarray(self._columns @ self._factorization.solve(self._columns.T @ right), dtype=float)
+
+
+def factorize(band: Array, columns: Array | None = None) -> Factorization | RestrictedFactorization:
+    """Factor a matrix, restricted to a subspace where columns are given."""
+    return Factorization(band) if columns is None else RestrictedFactorization(band, columns)

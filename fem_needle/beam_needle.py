@@ -41,6 +41,10 @@ class BeamNeedle(ABC):
         The beam's own matrices.
     """
 
+    axial_force_acts = True
+    largest_spectral_radius = 1.0
+    warnings: tuple[str, ...] = ()
+
     def __init__(self, scene: Scene, shapes: Shapes, frame: Frame, beam: Beam) -> None:
         self.scene = scene
         self.shapes = shapes
@@ -55,6 +59,11 @@ class BeamNeedle(ABC):
         self._beam = beam
         self._stiffness_factor = as_function(scene.tissue.stiffness_factor)
         self._point_list = points_of(scene)
+
+    @property
+    def point_positions(self) -> tuple[float, ...]:
+        """Positions y [m] of guides and lateral loads."""
+        return tuple(point.position for point in self._point_list)
 
     def operators(self, depth: float, time: float) -> Operators:
         """Return the matrices at a depth [m] and time [s]."""
@@ -101,7 +110,7 @@ class BeamNeedle(ABC):
 
     def points(self, depth: float) -> Points:
         """Return rows and flexibilities of guides, lateral loads and tip."""
-        positions = [point.position for point in self._point_list]
+        positions = self.point_positions
         count = len(positions) + self.turns + 1
         rows, rates = np.zeros((count, self.size)), np.zeros((count, self.size))
         for index, y in [*enumerate(positions), (count - 1, depth)]:

@@ -79,9 +79,14 @@ def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
 
 def tip_difference(scene: Scene, plant: Plant, finer: Plant) -> float:
     """Return the largest difference of two plants' static tips over the run, relative to the largest of the finer one's."""
-    coarse, fine = _static_tips(plant), _static_tips(finer)
+    return float(np.max(tip_differences(scene, plant, finer)))
+
+
+def tip_differences(scene: Scene, plant: Plant, finer: Plant) -> Array:
+    """Return the differences at each of the `instants`."""
+    coarse, fine = static_tips(plant), static_tips(finer)
     scale = max(float(np.max(np.abs(fine))), scene.numerics.absolute_tolerance)
-    return float(np.max(np.abs(coarse - fine))) / scale
+    return np.abs(coarse - fine) / scale
 
 
 def first_time_step(plant: Plant, analysis: str, output_step: float) -> float:
@@ -89,15 +94,16 @@ def first_time_step(plant: Plant, analysis: str, output_step: float) -> float:
     step = min(output_step, shortest_period(plant.scene) / POINTS_PER_PERIOD)
     if analysis != "dynamic":
         return step
-    frequencies = [natural_frequencies(plant, depth, time)[0] for time, depth in _instants(plant)]
+    frequencies = [natural_frequencies(plant, depth, time)[0] for time, depth in instants(plant)]
     return min(step, 2 * pi / min(frequencies) / STEPS_PER_PERIOD)
 
 
-def _static_tips(plant: Plant) -> Array:
-    return np.array([solve_static(plant, depth=depth, time=time).tip_deflection for time, depth in _instants(plant)])
+def static_tips(plant: Plant) -> Array:
+    """Return the static tip deflections [m] at the `instants`."""
+    return np.array([solve_static(plant, depth=depth, time=time).tip_deflection for time, depth in instants(plant)])
 
 
-def _instants(plant: Plant) -> list[tuple[float, float]]:
+def instants(plant: Plant) -> list[tuple[float, float]]:
     """Return (time, depth) spread over the run; what is hardly inserted yet is left out."""
     scene, law = plant.scene, depth_law(plant.scene)
     times = np.linspace(0.0, run_duration(scene), PILOT_INSTANTS).tolist()

@@ -18,7 +18,9 @@ def frozen_matrices(plant: Plant, depth: float, time: float) -> tuple[Array, Arr
     """Return mass, damping, stiffness and the tip's row at a frozen depth, for coordinates that obey clamp and guides."""
     operators, points, clamped = plant.operators(depth, time), plant.points(depth), plant.prescribed
     rigid = [index for index in range(points.guides) if points.guide_compliance[index] == 0.0]
-    basis = null_space(points.rows[rigid, clamped:]) if rigid else np.eye(plant.size - clamped)
+    basis = np.eye(plant.size - clamped) if operators.subspace is None else operators.subspace
+    if rigid:
+        basis = basis @ null_space(points.rows[rigid, clamped:] @ basis)
 
     def reduced(band: Array | None) -> Array:
         if band is None:

@@ -42,6 +42,11 @@ class Operators:
         dm/dt G, of a tissue that swells.
     clamped
         How many leading coordinates are the clamp's.
+    subspace
+        Directions (size - clamped, rank) of the free coordinates to which every solution is restricted, of a plant whose
+        shapes are nearly dependent at this depth; None: all.
+    positional_error, velocity_error
+        X and Y: forces -X q - Y q' of a model with mistakes in it, which come from no energy and stand in no ledger.
     """
 
     mass: Array
@@ -54,6 +59,9 @@ class Operators:
     slip: Array | None = None
     tissue_rate: Array | None = None
     clamped: int = 0
+    subspace: Array | None = None
+    positional_error: Array | None = None
+    velocity_error: Array | None = None
 
     @cached_property
     def stiffness(self) -> Array:
@@ -61,9 +69,14 @@ class Operators:
         return self.bending + self.tissue
 
     @cached_property
-    def mass_factorization(self) -> banded.Factorization:
+    def mass_factorization(self) -> banded.Factorization | banded.RestrictedFactorization:
         """Factors of the mass matrix of the coordinates that are not clamped."""
-        return banded.Factorization(banded.trailing(self.mass, self.clamped))
+        return banded.factorize(banded.trailing(self.mass, self.clamped), self.subspace)
+
+    @cached_property
+    def stiffness_factorization(self) -> banded.Factorization | banded.RestrictedFactorization:
+        """Factors of the stiffness matrix of the coordinates that are not clamped."""
+        return banded.factorize(banded.trailing(self.stiffness, self.clamped), self.subspace)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +154,12 @@ class Plant(Protocol):
         Coordinates of the function 1: their product with a force vector is the total force.
     smallest_depth
         Below this depth [m] the plant has no inserted part and is straight; 0 where it always has one.
+    axial_force_acts
+        Whether a push feels the axial force A of the lateral state.
+    largest_spectral_radius
+        Of the integrator of a moving needle: below 1 where vibrations that a step does not resolve would grow.
+    warnings
+        What a user should know of the model before trusting it.
     """
 
     scene: Scene
@@ -148,6 +167,9 @@ class Plant(Protocol):
     prescribed: int
     deflection_at_one: Array
     smallest_depth: float
+    axial_force_acts: bool
+    largest_spectral_radius: float
+    warnings: tuple[str, ...]
 
     def operators(self, depth: float, time: float) -> Operators:
         """Return the matrices."""

@@ -188,7 +188,9 @@ class Pusher:
         cutting = axial.cutting_force(self.scene, ahead, float(direction), state.deepest)
         for stage, solution in zip(step.stages, step.solutions, strict=True):
             time, depth = stage.instant.time, stage.instant.depth
-            lateral = configuration_force(self.stepper.plant, stage, solution, inertia=self.stepper.inertia)
+            lateral = 0.0
+            if self.stepper.plant.axial_force_acts:
+                lateral = configuration_force(self.stepper.plant, stage, solution, inertia=self.stepper.inertia)
             friction = direction * axial.coulomb_force(self.scene, depth)
             constant.append(self.push(time) - friction - cutting + lateral)
             viscous.append(axial.viscous_coefficient(self.scene, depth))

@@ -93,7 +93,9 @@ def sample_step(
 
 
 def axial_force_at(plant: Plant, step: Step, *, at_start: bool, inertia: bool) -> float:
-    """Return the axial force A [N] at the end, or the start, of a step."""
+    """Return the axial force A [N] at the end, or the start, of a step; 0 of a model whose push does not feel it."""
+    if not plant.axial_force_acts:
+        return 0.0
     end = step.ends[0] if at_start else step.ends[1]
     force = configuration_force(plant, end.stage, end.solution, inertia=inertia)
     return force - float(_rate(step, _axial_momenta(step), at_start=at_start)) if inertia else force

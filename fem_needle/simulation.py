@@ -231,10 +231,28 @@ def _difference(coarser: Trajectory, finer: Trajectory) -> float:
 
 def _stepper(job: _Job) -> Stepper:
     if job.choice.analysis == "dynamic":
-        return DynamicStepper(job.plant, collocation(job.scene.numerics.spectral_radius))
+        return DynamicStepper(job.plant, collocation(_spectral_radius(job)))
     if job.choice.analysis == "static":
         return StaticStepper(job.plant)
     return inertia_free_stepper(job.plant)
+
+
+def _spectral_radius(job: _Job) -> float:
+    """Return the scene's, lowered where the plant needs it to stay stable while it moves."""
+    asked = job.scene.numerics.spectral_radius
+    lowest, highest = job.scene.insertion.depth_range(job.scene.duration)
+    moves = highest > lowest or job.scene.insertion.kind == "force"
+    return min(asked, job.plant.largest_spectral_radius) if moves else asked
+
+
+def _warnings(job: _Job) -> list[str]:
+    found = [*job.plant.warnings, *job.chosen.warnings]
+    radius, asked = _spectral_radius(job), job.scene.numerics.spectral_radius
+    if job.choice.analysis == "dynamic" and radius < asked:
+        found.append(
+            f"numerics.spectral_radius = {asked:g} > {radius:g}, with which this model stays stable while it moves: {radius:g} is used"
+        )
+    return found
 
 
 def _begin(job: _Job, grid: TimeGrid) -> None:
@@ -288,7 +306,7 @@ def _trajectory(job: _Job, grid: TimeGrid, samples: list[Sample], time_error: fl
         | summary_of(run)
         | {
             "error_estimate": estimate,
-            "warnings": list(job.chosen.warnings),
+            "warnings": _warnings(job),
             "stop_reason": end.reason,
             "steps": end.steps,
             "solve_time": now - job.started,

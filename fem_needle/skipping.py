@@ -106,7 +106,7 @@ def _forced_effect(plant: Plant, piece: list[Sample]) -> float:
         acceleration = 2.0 * slope / (first + second)
         operators, points = plant.operators(now.depth, now.time), plant.points(now.depth)
         force = -banded.multiply(operators.mass, acceleration)
-        moved, _ = solve_guided(plant, operators.stiffness, points, force, np.zeros(points.guides))
+        moved, _ = solve_guided(plant, operators, points, force, np.zeros(points.guides))
         effect = max(effect, abs(float(points.rows[-1] @ moved)))
     return effect
 

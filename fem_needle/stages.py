@@ -5,7 +5,7 @@ In momentum form, with P = M q' + v S q,
     P' = v S^T q' + v^2 R q - (K + m G) q - C q' - v D q + N.forces
 
 no derivative of the matrices and none of the speed appears, and P is what stays continuous at a jump of speed. The unknowns are
-the free coordinates at the stages; guides add their forces as multipliers.
+the increments of the free coordinates up to the stages; guides add their forces as multipliers.
 """
 
 from __future__ import annotations
@@ -125,6 +125,10 @@ def internal_force(stage: Stage, coordinates: Array, velocities: Array) -> Array
     """Return v S^T q' + v^2 R q - (K + m G) q - C q' - v D q, the rate of P without the point forces."""
     operators, speed = stage.operators, stage.instant.speed
     result = -banded.multiply(operators.stiffness, coordinates)
+    if operators.positional_error is not None:
+        result -= banded.multiply(operators.positional_error, coordinates)
+    if operators.velocity_error is not None:
+        result -= banded.multiply(operators.velocity_error, velocities)
     if stage.rest is not None:
         result += stage.factor * stage.rest.load
     if operators.damping is not None:
@@ -147,7 +151,7 @@ def trivial_solution(plant: Plant, stage: Stage) -> StageSolution:
 class StepSystem:
     """The factored matrix of a step."""
 
-    factorization: banded.Factorization
+    factorization: banded.Factorization | banded.RestrictedFactorization
     guide_columns: Array
     guide_answers: Array
 
@@ -170,10 +174,14 @@ def step_matrix(stages: tuple[Stage, Stage], method: Collocation, step: float, c
 
 
 def _add_first_order(block: Array, stages: tuple[Stage, Stage], row: int, column: int, slope: float) -> Array:
-    """Add v S, -v S^T, C and, on the diagonal, v D - v^2 R."""
+    """Add v S, -v S^T, C, Y and, on the diagonal, v D - v^2 R + X."""
     operators, speed = stages[row].operators, stages[row].instant.speed
     if operators.damping is not None:
         block = block + slope * operators.damping
+    if operators.velocity_error is not None:
+        block = block + slope * operators.velocity_error
+    if row == column and operators.positional_error is not None:
+        block = block + operators.positional_error
     other, other_speed = stages[column].operators.convection, stages[column].instant.speed
     if operators.convection is not None and other is not None and (speed or other_speed):
         block = block + slope * (other_speed * other - speed * banded.transpose(operators.convection))
@@ -188,7 +196,9 @@ def _add_first_order(block: Array, stages: tuple[Stage, Stage], row: int, column
 def factor_step(plant: Plant, stages: tuple[Stage, Stage], method: Collocation, step: float) -> StepSystem:
     """Factor the step's matrix and solve for the guides' columns."""
     clamped, guides = plant.prescribed, stages[0].points.guides
-    factorization = banded.Factorization(step_matrix(stages, method, step, clamped))
+    subspace = stages[0].operators.subspace
+    both = None if subspace is None else np.asarray(np.kron(subspace, np.eye(2)), dtype=float)
+    factorization = banded.factorize(step_matrix(stages, method, step, clamped), both)
     columns = np.zeros((2 * (plant.size - clamped), 2 * guides))
     for number, stage in enumerate(stages):
         columns[number::2, number * guides : (number + 1) * guides] = stage.points.rows[:guides, clamped:].T
@@ -205,9 +215,12 @@ def solve_step(
     coordinates: Array,
     start_momentum: Array,
 ) -> tuple[StageSolution, StageSolution]:
-    """Solve the stage equations from coordinates q and momentum P at the start of the step."""
+    """Solve the stage equations from coordinates q and momentum P at the start of the step.
+
+    The unknowns are the increments of the free coordinates since then.
+    """
     clamped = plant.prescribed
-    bases = [_known_motion(stage, method, step, number, coordinates, clamped) for number, stage in enumerate(stages)]
+    bases = [_known_motion(stage, coordinates, clamped) for stage in stages]
     right = _right_side(stages, method, step, bases, start_momentum)
     answer = system.factorization.solve(np.stack([side[clamped:] for side in right], axis=1).ravel())
     guide_forces = _guide_forces(stages, system, bases, answer)
@@ -216,7 +229,7 @@ def solve_step(
     solutions = []
     for number, (stage, (known, known_velocity)) in enumerate(zip(stages, bases, strict=True)):
         stage_coordinates, velocities = known.copy(), known_velocity.copy()
-        stage_coordinates[clamped:] = free[:, number]
+        stage_coordinates[clamped:] += free[:, number]
         velocities[clamped:] += free @ method.inverse[number] / step
         forces = np.concatenate([guide_forces[number], stage.case.forces])
         solutions.append(
@@ -225,12 +238,9 @@ def solve_step(
     return solutions[0], solutions[1]
 
 
-def _known_motion(
-    stage: Stage, method: Collocation, step: float, number: int, coordinates: Array, clamped: int
-) -> tuple[Array, Array]:
-    """Return coordinates and velocities with the unknowns at zero: the clamp's motion and the start's share."""
-    known = np.zeros_like(coordinates)
-    velocities = coordinates * (-method.inverse[number].sum() / step)
+def _known_motion(stage: Stage, coordinates: Array, clamped: int) -> tuple[Array, Array]:
+    """Return coordinates and velocities with the unknowns at zero: the clamp moves, the rest stays where it was."""
+    known, velocities = coordinates.copy(), np.zeros_like(coordinates)
     known[:clamped], velocities[:clamped] = stage.case.clamp[:clamped], stage.case.clamp_rates[:clamped]
     return known, velocities
 

@@ -94,7 +94,7 @@ def static_state(
     force = points.rows[guides:].T @ case.forces - banded.multiply(operators.stiffness, known)
     gap = points.rows[:guides] @ known + points.flexibility[:guides, guides:] @ case.forces
     try:
-        free, guide_forces = solve_guided(plant, operators.stiffness, points, force, gap)
+        free, guide_forces = solve_guided(plant, operators, points, force, gap)
     except (banded.SingularMatrixError, np.linalg.LinAlgError) as error:
         raise ComputationError(
             f"no static solution at time {time:g} s, depth {depth:g} m: {error}; check stiffnesses and use fewer elements"
@@ -110,7 +110,7 @@ def known_coordinates(plant: Plant, case: LoadCase) -> Array:
 
 
 def solve_guided(
-    plant: Plant, stiffness: Array, points: Points, force: Array, gap: Array
+    plant: Plant, operators: Operators, points: Points, force: Array, gap: Array
 ) -> tuple[Array, Array]:
     """Solve K x = force + N.R for the free coordinates, with N x + (B + compliance) R = -gap at the guides.
 
@@ -118,9 +118,7 @@ def solve_guided(
     """
     clamped, guides = plant.prescribed, points.guides
     rows = points.rows[:guides, clamped:]
-    answers = banded.Factorization(banded.trailing(stiffness, clamped)).solve(
-        np.column_stack([force[clamped:], rows.T])
-    )
+    answers = operators.stiffness_factorization.solve(np.column_stack([force[clamped:], rows.T]))
     result = np.zeros(plant.size)
     result[clamped:] = answers[:, 0]
     if not guides:
@@ -192,7 +190,7 @@ def depth_derivative(plant: Plant, rest: Equilibrium) -> tuple[Array, Array]:
     force = points.row_rates.T @ rest.point_forces - moved
     guides = points.guides
     drift = points.row_rates[:guides] @ rest.coordinates + points.flexibility_rate[:guides] @ rest.point_forces
-    return solve_guided(plant, operators.stiffness, points, force, drift)
+    return solve_guided(plant, operators, points, force, drift)
 
 
 def _straight(plant: Plant, depth: float, time: float, case: LoadCase) -> Equilibrium:

@@ -1,1 +1,24 @@
 """Assumed-mode models of a needle in soft tissue."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+# Name and the module that defines it, imported at its first use.
+_HOMES = {
+    "AssumedModeNeedle": "reduced_model.needle",
+    "ClampedFreeModes": "reduced_model.modes",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its module."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'reduced_model' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return sorted(_HOMES)

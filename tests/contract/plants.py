@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fem_needle import FiniteElementNeedle
 from fem_needle.plant import Plant
 from fem_needle.scene import Guide, LateralLoad, Layer, Model, Scene, Sinusoid, TipLoad
+from reduced_model import AssumedModeNeedle
 from tests.consistency.scenes import held, scene_of
 
 LAYERS = (
@@ -37,13 +38,30 @@ def _elements(count: int, degree: int) -> Callable[[Scene], Plant]:
     return lambda scene: FiniteElementNeedle(scene, elements=count, degree=degree)
 
 
-CASES = {
+def _modes(count: int, basis: str, corrections: bool) -> Callable[[Scene], Plant]:
+    return lambda scene: AssumedModeNeedle(scene, modes=count, basis=basis, static_corrections=corrections)
+
+
+SCENES = {
+    "entry": scene_of("entry", held(0.1), LAYERS, TIP, tissue=SWELLING),
+    "entry, fixed-frame": scene_of("entry", held(0.1), LAYERS, TIP, tissue=SWELLING, model=Model(kinematics="fixed-frame")),
+    "hub": scene_of("hub", held(0.1), LAYERS, POINTS, tissue=SWELLING),
+    "hub, guides": scene_of("hub", held(0.1), LAYERS, POINTS, tissue=SWELLING, support=GUIDES),
+}
+ELEMENTS = {
     f"elements of degree {degree}, {name}": Case(scene, _elements(7, degree))
     for degree in (3, 4)
-    for name, scene in {
-        "entry": scene_of("entry", held(0.1), LAYERS, TIP, tissue=SWELLING),
-        "entry, fixed-frame": scene_of("entry", held(0.1), LAYERS, TIP, tissue=SWELLING, model=Model(kinematics="fixed-frame")),
-        "hub": scene_of("hub", held(0.1), LAYERS, POINTS, tissue=SWELLING),
-        "hub, guides": scene_of("hub", held(0.1), LAYERS, POINTS, tissue=SWELLING, support=GUIDES),
-    }.items()
+    for name, scene in SCENES.items()
 }
+MODES = {
+    f"{count} modes, {basis}{', corrected' * corrections}, {name}": Case(scene, _modes(count, basis, corrections))
+    for count, basis, corrections in (
+        (2, "full-length", False),
+        (4, "inserted-length", False),
+        (5, "full-length", False),
+        (2, "full-length", True),
+    )
+    for name, scene in SCENES.items()
+    if basis == "full-length" or "entry" in name
+}
+CASES = ELEMENTS | MODES
