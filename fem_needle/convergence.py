@@ -9,7 +9,7 @@ from typing import Any, Literal
 from fem_needle.convergence_rows import ConvergenceRow, RowMaker, best_reference, gathered
 from fem_needle.errors import SceneError
 from fem_needle.exact_reference import exact_reference
-from fem_needle.refinement import PATHS, Level, Setting, coarsest_time_step, finer_otherwise, levels_of, setting_of
+from fem_needle.refinement import PATHS, Level, Setting, coarsest_time_step, finer_otherwise, levels_of, setting_of, size_of
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
 from fem_needle.theoretical_order import theoretical_order
@@ -175,7 +175,7 @@ def _study(setting: Setting, levels: tuple[Level, ...]) -> ConvergenceStudy:
     other = finer_otherwise(setting, finest) if exact is not None and setting.times is None else None
     evidence = gathered(levels, exact, other)
     reference = best_reference(evidence, theory.order)
-    maker = RowMaker(evidence, reference, theory.order, "" if other is None else _held_name(setting))
+    maker = RowMaker(evidence, reference, theory.order, "" if other is None else _held_name(setting, finest))
     return ConvergenceStudy(
         scene=setting.scene,
         over=setting.over,  # type: ignore[arg-type]
@@ -190,8 +190,9 @@ def _study(setting: Setting, levels: tuple[Level, ...]) -> ConvergenceStudy:
     )
 
 
-def _held_name(setting: Setting) -> str:
-    return "elements" if setting.over == "time-step" else "time step"
+def _held_name(setting: Setting, finest: Level) -> str:
+    """Return what limits the error against an exact answer: the time step, or the size of the model."""
+    return "time step" if setting.over != "time-step" else size_of(finest.plant)[0]
 
 
 def _held(setting: Setting, finest: Level) -> dict[str, int | float | str]:

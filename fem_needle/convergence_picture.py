@@ -83,7 +83,7 @@ def _draw_theory(axes: Axes, study: ConvergenceStudy) -> None:
 def _draw_floor(axes: Axes, study: ConvergenceStudy) -> None:
     """Draw the round-off, and what the held discretization costs, where they hold a row up."""
     if study.held_error and any(row.note.startswith("limited") for row in study.rows):
-        label = "finer elements change" if study.over == "time-step" else "half the time step changes"
+        label = "a finer model changes" if study.over == "time-step" else "half the time step changes"
         axes.axhline(study.held_error, color=GRAY, linestyle="-.", linewidth=1.3, label=label, zorder=2)
     if not any(row.note == ROUND_OFF for row in study.rows):
         return

@@ -48,7 +48,7 @@ class ConvergenceRow:
     round_off
         Floor of the error from round-off [1].
     note
-        Why the order is missing or doubtful: "round-off", "limited by the time step", "limited by the elements", "oscillates",
+        Why the order is missing or doubtful: "round-off", "limited by the time step" (or elements, modes), "oscillates",
         "diverges", or nothing.
     solve_time
         [s].
@@ -203,7 +203,7 @@ class RowMaker:
     theoretical_order
         Of the tip, or None.
     held_name
-        What is held fixed and may limit the error: "time step", "elements", or nothing.
+        What is held fixed and may limit the error: "time step", "elements", "modes", or nothing.
     """
 
     evidence: Evidence

@@ -7,9 +7,10 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from fem_needle import ConvergenceStudy, SceneError, converge, load_scene, simulate
+from fem_needle import ConvergenceStudy, FiniteElementNeedle, SceneError, converge, load_scene, simulate
 from fem_needle.convergence_rows import RowMaker, best_reference, gathered
 from fem_needle.exact_reference import ExactReference
+from fem_needle.models import ChosenPlant
 from fem_needle.refinement import Level
 from fem_needle.study_files import csv_bytes
 
@@ -183,3 +184,27 @@ def test_an_interrupted_run_is_no_row(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         converge(scene, values=(1, 2), time_step=1e-4)
     assert len(interrupted) == 1
+
+
+class CountedInModes:
+    """A family of which the studies know nothing: finite elements, as many as the scene has modes."""
+
+    def pilot(self, scene):
+        return self.build(scene)
+
+    def build(self, scene):
+        return FiniteElementNeedle(scene, elements=scene.model.modes)
+
+    def choose(self, scene, analysis):
+        return ChosenPlant(self.build(scene), None)
+
+
+def test_another_model_is_studied_over_its_modes_without_code_that_knows_it(monkeypatch):
+    over_elements = converge(BENCH, "elements", (2, 4, 8))
+    monkeypatch.setattr("fem_needle.refinement.model_family", lambda kind: CountedInModes())
+    over_modes = converge(BENCH, "modes", (2, 4, 8), model="counted")
+    assert [row.error for row in over_modes.rows] == [row.error for row in over_elements.rows]
+    assert over_modes.theoretical_order is None
+    assert [row.asymptotic for row in over_modes.rows] == [None, None, True]
+    with pytest.raises(SceneError, match="does not change"):
+        converge(BENCH, "elements", (2, 4), model="counted")
