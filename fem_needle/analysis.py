@@ -78,7 +78,7 @@ class DepthAnalysis:
     model
         Linear model in the model's own coordinates.
     slow
-        The same in its slowest vibrations, in which the verdicts were found.
+        The same in its slowest six vibrations, in which the verdicts were found; the same model where it has no more coordinates.
     gains
         Static gain of the tip at the held depth by input.
     verdicts
@@ -204,7 +204,7 @@ def scene_depths(scene: Scene) -> list[float]:
 
 def _analyzed(plant: Plant, model: LinearModel) -> DepthAnalysis:
     coordinates = len(model.states) // 2 - sum(signal.name in AXIAL for signal in model.states)
-    slow = modal(model, min(SLOWEST, coordinates))
+    slow = modal(model, SLOWEST) if coordinates > SLOWEST else model
     point = model.operating_point
     held = depth_gains(plant, [point.depth], time=point.time)
     gains = {signal.name: float(gain) for signal, gain in zip(held.inputs, held.gains[0], strict=True)}

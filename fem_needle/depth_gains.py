@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from fem_needle.errors import SceneError
+from fem_needle.errors import ComputationError, SceneError
 from fem_needle.linear_model import Signal
 from fem_needle.linearization import lateral_inputs, linearize, reach
 from fem_needle.loads import LoadCase
@@ -50,7 +50,7 @@ class DepthGains:
     gains
         dw(tip) / d(input) at rest, shape (n, inputs).
     frequencies
-        Lowest undamped natural frequencies at a held depth [rad/s], shape (n, at most 3).
+        Lowest undamped natural frequencies at a held depth [rad/s], shape (n, 3); nan where there are fewer.
     sign_changes
         By input, then by depth.
     """
@@ -91,8 +91,7 @@ def depth_gains(plant: Plant, depths: ArrayLike | None = None, *, time: float = 
         raise SceneError(f"depths: out of range (got {places.tolist()}; allowed rising, above {least:g} to {length:g} m)")
     inputs = (*lateral_inputs(plant), Signal("depth", "m"))
     gains = np.array([tip_gains(plant, float(depth), time) for depth in places])
-    models = [linearize(plant, depth=float(depth), time=time, axial="held") for depth in places]
-    frequencies = np.array([lateral_frequencies(model)[:FREQUENCIES] for model in models])
+    frequencies = np.array([_frequencies(plant, float(depth), time) for depth in places])
     changes = [change for index, one in enumerate(inputs) for change in _changes(plant, places, gains, index, one.name, time)]
     return DepthGains(places, inputs, gains, frequencies, tuple(changes))
 
@@ -102,6 +101,17 @@ def _default_depths(scene: Scene) -> Array:
     least = SHALLOWEST * scene.needle.length
     rest = END * scene.needle.length if scene.support.kind == "hub" else 0.0
     return np.linspace(least, max(reach(scene) - rest, 2 * least), POINTS)
+
+
+def _frequencies(plant: Plant, depth: float, time: float) -> Array:
+    """Return the lowest frequencies, nan where there are fewer or the model has none."""
+    result = np.full(FREQUENCIES, np.nan)
+    try:
+        found = lateral_frequencies(linearize(plant, depth=depth, time=time, axial="held"))[:FREQUENCIES]
+    except ComputationError:
+        return result
+    result[: len(found)] = found
+    return result
 
 
 def tip_gains(plant: Plant, depth: float, time: float = 0.0) -> Array:

@@ -51,7 +51,9 @@ def guided(motion: SmallMotion, clamped: int) -> Guided:
         return Guided(np.zeros((0, size)), np.zeros((0, size)), np.zeros((0, len(points.rows))))
     rows = motion.rows[:guides]
     free = 1 + clamped
-    own = rows[:, free:] @ np.linalg.solve(motion.stiffness[free:, free:], rows[:, free:].T)
+    basis = np.eye(size - free) if motion.subspace is None else motion.subspace
+    reached = rows[:, free:] @ basis
+    own = reached @ np.linalg.solve(basis.T @ motion.stiffness[free:, free:] @ basis, reached.T)
     flexibility = points.flexibility[:guides, :guides] + np.diag(points.guide_compliance)
     values, vectors = np.linalg.eigh(flexibility)
     soft = values > RIGID * float(np.max(np.diag(own)))
@@ -73,13 +75,16 @@ class Coordinates:
     given: Array
 
 
-def independent_coordinates(constraints: Array, clamped: int, *, moves: bool) -> Coordinates:
-    """Return coordinates that obey clamp and rigid guides; the depth is the first where it moves."""
+def independent_coordinates(
+    constraints: Array, clamped: int, *, moves: bool, subspace: Array | None = None
+) -> Coordinates:
+    """Return coordinates that obey clamp, rigid guides and a subspace; the depth is the first where it moves."""
     size = constraints.shape[1]
     first = 1 + clamped
-    held = constraints[:, first:]
-    basis = null_space(held) if len(held) else np.eye(size - first)
-    inverse = np.linalg.pinv(held) if len(held) else np.zeros((size - first, 0))
+    directions = np.eye(size - first) if subspace is None else subspace
+    held = constraints[:, first:] @ directions
+    basis = directions @ null_space(held) if len(held) else directions
+    inverse = directions @ np.linalg.pinv(held) if len(held) else np.zeros((size - first, 0))
     free = np.zeros((size, moves + basis.shape[1]))
     free[first:, moves:] = basis
     if moves:

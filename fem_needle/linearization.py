@@ -65,8 +65,9 @@ def linearize(
     guides = guided(motion, plant.prescribed)
     motion = _with_springs(motion, guides)
     given = plant.prescribed if plant.scene.support.kind == "hub" else 0
-    chosen = independent_coordinates(guides.constraints, plant.prescribed, moves=moves)
-    parts = _second_order(motion, replace(chosen, given=chosen.given[:, :given]), _inputs(motion, guides, moves=moves))
+    chosen = independent_coordinates(guides.constraints, plant.prescribed, moves=moves, subspace=motion.subspace)
+    loads = _inputs(plant, motion, guides, moves=moves)
+    parts = _second_order(motion, replace(chosen, given=chosen.given[:, :given]), loads)
     rows = _outputs(plant, point, motion, moves=moves)
     outputs = _output_matrices(rows, guides, chosen.free, chosen.given[:, :given], parts, moves=moves)
     names = _Names(plant.scene, chosen.free.shape[1] - moves, moves, given)
@@ -123,10 +124,12 @@ def _with_springs(motion: SmallMotion, guides: Guided) -> SmallMotion:
     return replace(motion, stiffness=stiffness)
 
 
-def _inputs(motion: SmallMotion, guides: Guided, *, moves: bool) -> Array:
+def _inputs(plant: Plant, motion: SmallMotion, guides: Guided, *, moves: bool) -> Array:
     """Return the generalized forces of push (where the depth moves) and of each load, shape (1 + size, inputs)."""
     count = motion.points.guides
     loads = motion.rows[count:].T + motion.rows[:count].T @ guides.reactions_to_forces
+    if not plant.axial_force_acts:
+        loads[0] = 0.0
     push = np.zeros((len(loads), 1))
     push[0] = 1.0
     return np.hstack([push, loads]) if moves else loads

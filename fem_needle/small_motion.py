@@ -31,7 +31,8 @@ class OperatingPoint:
     depth, speed, time
         z [m], v [m/s], and the time [s] whose loads, hub and stiffness factor act, frozen.
     coordinates, velocities, accelerations
-        q of the equilibrium, q' = v dq/dz, and the q'' that the equations give there; zeros at rest.
+        q of the equilibrium, q' = v dq/dz, and the q'' that the equations give there; zeros at rest (but for a model with
+        mistakes in it, which does not rest where its energy is least).
     point_forces
         At guides, lateral loads and tip [N].
     tip_deflection
@@ -63,6 +64,8 @@ class SmallMotion:
         How the deflections at the points change with xi, (points, 1 + size): N, before it dN/dz q + dB/dz P.
     points
         The points at the operating depth.
+    subspace
+        Directions (free coordinates, rank) to which the plant restricts solutions; None: all.
     """
 
     mass: Array
@@ -70,11 +73,12 @@ class SmallMotion:
     stiffness: Array
     rows: Array
     points: Points
+    subspace: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class _Dense:
-    """The matrices of a plant at one depth, dense; zeros where a term is absent."""
+    """The matrices of a plant at one depth, dense; zeros where a term is absent. The last two are a model's mistakes X and Y."""
 
     mass: Array
     convection: Array
@@ -83,6 +87,8 @@ class _Dense:
     damping: Array
     drag: Array
     slip: Array
+    positional_error: Array
+    velocity_error: Array
 
 
 def operating_point(plant: Plant, *, depth: float, time: float, speed: float) -> OperatingPoint:
@@ -93,13 +99,14 @@ def operating_point(plant: Plant, *, depth: float, time: float, speed: float) ->
     ComputationError
         If there is no equilibrium.
     """
-    rest = solve_static(plant, depth=depth, time=time)
+    rest, is_wrong = solve_static(plant, depth=depth, time=time), _has_mistakes(plant, depth, time)
     zero = np.zeros(plant.size)
     point = OperatingPoint(
         depth, speed, time, rest.coordinates, zero, zero, rest.point_forces, rest.tip_deflection, 0.0
     )
     if speed:
         point = replace(point, velocities=speed * depth_derivative(plant, rest)[0])
+    if speed or is_wrong:
         point = replace(point, accelerations=_accelerations(plant, point))
     return replace(point, push_force=_push_force(plant, point))
 
@@ -119,13 +126,36 @@ def small_motion(plant: Plant, point: OperatingPoint, *, moves: bool) -> SmallMo
     dense, points = _dense(plant, point.depth, point.time), plant.points(point.depth)
     known = points.row_rates @ point.coordinates + points.flexibility_rate @ point.point_forces
     motion = SmallMotion(
-        *_at_rest(plant, point, dense, points), rows=np.column_stack([known, points.rows]), points=points
+        *_at_rest(plant, point, dense, points),
+        rows=np.column_stack([known, points.rows]),
+        points=points,
+        subspace=plant.operators(point.depth, point.time).subspace,
     )
-    if point.speed:
+    if point.speed or np.any(point.accelerations):
         motion = _with_speed(plant, point, dense, motion)
+    if not plant.axial_force_acts:
+        return _without_axial_force(plant, point, motion)
     if moves:
         motion.stiffness[0, 0] += float(numerical_rate(lambda z: _rate_of_energy(plant, point, z), point.depth, plant.scene))
     return motion
+
+
+def _without_axial_force(plant: Plant, point: OperatingPoint, motion: SmallMotion) -> SmallMotion:
+    """Return the motion of a model whose depth feels nothing of the bending: mass and friction alone in the axial row."""
+    scene, friction = plant.scene, plant.scene.friction
+    mass, damping, stiffness = (matrix.copy() for matrix in (motion.mass, motion.damping, motion.stiffness))
+    for matrix in (mass, damping, stiffness):
+        matrix[0] = 0.0
+    mass[0, 0] = scene.needle.mass_per_length * scene.needle.length
+    damping[0, 0] = axial.viscous_coefficient(scene, point.depth)
+    stiffness[0, 0] = np.sign(point.speed) * friction.coulomb_per_length + point.speed * friction.viscous_per_length
+    return replace(motion, mass=mass, damping=damping, stiffness=stiffness)
+
+
+def _has_mistakes(plant: Plant, depth: float, time: float) -> bool:
+    """Return whether the model has forces that come from no energy: its equilibria are none of its own equations."""
+    operators = plant.operators(depth, time) if depth >= plant.smallest_depth else None
+    return operators is not None and not (operators.positional_error is None and operators.velocity_error is None)
 
 
 def _dense(plant: Plant, depth: float, time: float) -> _Dense:
@@ -142,6 +172,8 @@ def _dense(plant: Plant, depth: float, time: float) -> _Dense:
         full(operators.damping),
         full(operators.drag),
         full(operators.slip),
+        full(operators.positional_error),
+        full(operators.velocity_error),
     )
 
 
@@ -158,8 +190,8 @@ def _at_rest(plant: Plant, point: OperatingPoint, dense: _Dense, points: Points)
     friction = axial.viscous_coefficient(scene, point.depth)
     return (
         _bordered(weight + float(q @ dense.centrifugal @ q), carried, carried, dense.mass),
-        _bordered(friction + float(q @ dense.slip @ q), dragged, dragged, dense.damping),
-        _bordered(0.0, pulled, pulled, dense.stiffness),
+        _bordered(friction + float(q @ dense.slip @ q), dragged, dragged, dense.damping + dense.velocity_error),
+        _bordered(0.0, pulled, pulled, dense.stiffness + dense.positional_error),
     )
 
 
@@ -185,12 +217,13 @@ def _with_speed(plant: Plant, point: OperatingPoint, dense: _Dense, motion: Smal
 
 
 def _moving_forces(plant: Plant, point: OperatingPoint, depth: float) -> Array:
-    """Return v M_z q' + v (S - S^T) q' + v^2 (S_z - R) q + C q' + v D q at a depth, the state held."""
+    """Return v M_z q' + v (S - S^T) q' + v^2 (S_z - R) q + C q' + v D q + X q + Y q' at a depth, the state held."""
     v, q, rate = point.speed, point.coordinates, point.velocities
     dense = _dense(plant, depth, point.time)
     mass_rate, convection_rate, _ = kinetic_matrix_rates(plant, depth)
-    carried = v * (mass_rate + dense.convection - dense.convection.T) + dense.damping
-    return carried @ rate + (v**2 * (convection_rate - dense.centrifugal) + v * dense.drag) @ q
+    carried = v * (mass_rate + dense.convection - dense.convection.T) + dense.damping + dense.velocity_error
+    placed = v**2 * (convection_rate - dense.centrifugal) + v * dense.drag + dense.positional_error
+    return carried @ rate + placed @ q
 
 
 def _accelerations(plant: Plant, point: OperatingPoint) -> Array:
@@ -231,4 +264,4 @@ def _push_force(plant: Plant, point: OperatingPoint) -> float:
     """Return the push that keeps the speed [N]."""
     resisting = axial.friction_force(plant.scene, point.depth, point.speed)
     resisting += axial.cutting_force(plant.scene, point.depth, point.speed, point.depth)
-    return resisting + _rate_of_energy(plant, point, point.depth)
+    return resisting + (_rate_of_energy(plant, point, point.depth) if plant.axial_force_acts else 0.0)

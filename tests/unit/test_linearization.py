@@ -15,6 +15,7 @@ from fem_needle.motion import Instant
 from fem_needle.scene import Friction, Guide, LateralLoad, Layer, Model, TipLoad
 from fem_needle.small_motion import operating_point
 from fem_needle.stages import StageSolution, evaluate_stage, internal_force, momentum
+from reduced_model import AssumedModeNeedle
 from tests.consistency.scenes import GEL, LENGTH, held, relative, scene_of
 
 LAYERS = (
@@ -34,6 +35,22 @@ SCENES = {
     "hub, springs": scene_of("hub", held(0.1), LAYERS, LATERAL, support=SPRINGS, friction=FRICTION),
     "free hub": scene_of("hub", held(0.1), LAYERS, LATERAL, support=FREE_HUB),
 }
+
+
+ENTRY = scene_of("entry", held(0.1), LAYERS, friction=FRICTION)
+HOMOGENEOUS = scene_of("entry", held(0.1), GEL, friction=FRICTION, initial={"shape": "straight"})
+PLANTS = {name: lambda scene=scene: plant_of(scene) for name, scene in SCENES.items()} | {
+    "hub, springs elsewhere": lambda: plant_of(SCENES["hub, springs"], 4),
+    "modes of the full length": lambda: AssumedModeNeedle(ENTRY, modes=2),
+    "modes of the inserted length": lambda: AssumedModeNeedle(ENTRY, modes=2, basis="inserted-length"),
+    "modes at a hub": lambda: AssumedModeNeedle(SCENES["hub"], modes=3),
+    "modes, corrected": lambda: AssumedModeNeedle(fixed(ENTRY), modes=2, variant="corrected"),
+    "modes, as printed": lambda: AssumedModeNeedle(fixed(HOMOGENEOUS), modes=2, variant="as-printed"),
+}
+
+
+def fixed(scene):
+    return scene.with_value("model.kinematics", "fixed-frame")
 
 
 def plant_of(scene, elements=3):
@@ -70,7 +87,8 @@ class Nonlinear:
         stage, state = self.at(depth, speed, coordinates, velocities)
         scene = self.plant.scene
         own = scene.needle.mass_per_length * scene.needle.length * speed
-        return np.array([own + axial_momentum(stage, coordinates, velocities), *state.momentum])
+        lateral = axial_momentum(stage, coordinates, velocities) if self.plant.axial_force_acts else 0.0
+        return np.array([own + lateral, *state.momentum])
 
     def __call__(self, depth, speed, coordinates, velocities):
         plant, scene, clamped = self.plant, self.plant.scene, self.plant.prescribed
@@ -79,7 +97,8 @@ class Nonlinear:
         resisting = self.direction * (friction.coulomb + friction.coulomb_per_length * depth)
         resisting += (friction.viscous + friction.viscous_per_length * depth) * speed
         lateral = internal_force(stage, coordinates, velocities) + stage.points.rows.T @ state.forces
-        force = np.array([self.push - resisting + configuration_force(plant, stage, state), *lateral])
+        along = configuration_force(plant, stage, state) if plant.axial_force_acts else 0.0
+        force = np.array([self.push - resisting + along, *lateral])
         step = 1e-5
         ahead, behind = (
             self.momenta(depth + sign * step * speed, speed, coordinates + sign * step * velocities, velocities)
@@ -108,11 +127,9 @@ def rates(plant, nonlinear, point, state):
 
 
 @pytest.mark.parametrize("speed", [0.0, -3.0])
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", PLANTS)
 def test_the_derivatives_are_those_of_the_nonlinear_equations(name, speed):
-    plant = plant_of(SCENES[name])
-    if name == "hub, springs" and speed:
-        plant = plant_of(SCENES[name], elements=4)  # other places of the guides in their elements
+    plant = PLANTS[name]()
     model = linearize(plant, depth=DEPTH, speed=speed)
     point = model.operating_point
     nonlinear = Nonlinear(plant, point, point.push_force)
@@ -129,9 +146,9 @@ def test_the_derivatives_are_those_of_the_nonlinear_equations(name, speed):
         assert error < 2e-5 * np.max(np.abs(weight * expected)) + 1e-6, column
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", PLANTS)
 def test_forces_enter_as_in_the_nonlinear_equations(name):
-    plant = plant_of(SCENES[name])
+    plant = PLANTS[name]()
     model = linearize(plant, depth=DEPTH)
     point, loads = model.operating_point, [one for one in model.inputs if one.unit in {"N", "N m"}]
     state = state_of(plant, point)
