@@ -82,3 +82,28 @@ def test_a_released_needle_is_compared_with_the_sum_over_modes():
     steps = converge(scene, "time-step", (1e-4, 5e-5, 2.5e-5), elements=24)
     assert steps.theoretical_order == pytest.approx(1.2)
     assert steps.observed_order == pytest.approx(1.2, abs=0.4)
+
+
+@pytest.mark.parametrize(("name", "basis"), [("bench-s", "inserted-length"), ("misra-2010", "full-length")])
+def test_modes_under_a_tip_force_are_of_third_order(name, basis):
+    scene = load_scene(name).with_values({"model.kind": "assumed-modes", "model.basis": basis})
+    study = converge(scene, "modes", (16, 32, 64))
+    assert study.reference.startswith("exact")
+    assert study.theoretical_order == 3.0
+    assert [row.observed_order for row in study.rows[1:]] == pytest.approx([3.0, 3.0], abs=0.1)
+
+
+def test_modes_of_a_released_needle_are_of_third_order():
+    changes = {"model.kind": "assumed-modes", "model.basis": "inserted-length", "run.duration": 0.01}
+    study = converge(load_scene("bench-d").with_values(changes), "modes", (1, 2, 4), time_step=1e-5)
+    assert study.theoretical_order == 3.0
+    assert study.observed_order == pytest.approx(3.0, abs=0.3)
+
+
+def test_theory_is_silent_where_modes_do_not_fit():
+    scene = load_scene("bench-s").with_value("model.kind", "assumed-modes")
+    assert converge(scene, "modes", (2, 3)).theoretical_order is None
+    corrected = scene.with_values({"model.basis": "inserted-length", "model.static_corrections": True})
+    study = converge(corrected, "modes", (2, 3))
+    assert study.theoretical_order is None
+    assert [row.note for row in study.rows] == ["round-off"] * 2  # the static response to the tip force is among the shapes
