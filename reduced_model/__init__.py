@@ -9,6 +9,12 @@ from typing import Any
 _HOMES = {
     "AssumedModeNeedle": "reduced_model.needle",
     "ClampedFreeModes": "reduced_model.modes",
+    "project": "reduced_model.projection",
+    "ProjectedNeedle": "reduced_model.projection",
+    "FixedBasis": "reduced_model.bases",
+    "mode_basis": "reduced_model.bases",
+    "natural_mode_basis": "reduced_model.bases",
+    "snapshot_basis": "reduced_model.bases",
 }
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fem_needle import FiniteElementNeedle
 from fem_needle.plant import Plant
 from fem_needle.scene import Guide, LateralLoad, Layer, Model, Scene, Sinusoid, TipLoad
-from reduced_model import AssumedModeNeedle
+from reduced_model import AssumedModeNeedle, mode_basis, project
 from tests.consistency.scenes import held, scene_of
 
 LAYERS = (
@@ -24,10 +24,11 @@ GUIDES = {"guides": [Guide(position=-0.0317, stiffness=1e3), Guide(position=-0.0
 
 @dataclass(frozen=True)
 class Case:
-    """A scene and how a plant is made of it."""
+    """A scene, how a plant is made of it, and what the plant calls itself."""
 
     scene: Scene
     make: Callable[[Scene], Plant]
+    name: str
 
     @property
     def plant(self) -> Plant:
@@ -42,6 +43,11 @@ def _modes(count: int, basis: str, corrections: bool) -> Callable[[Scene], Plant
     return lambda scene: AssumedModeNeedle(scene, modes=count, basis=basis, static_corrections=corrections)
 
 
+def _projected(scene: Scene) -> Plant:
+    needle = FiniteElementNeedle(scene, elements=9)
+    return project(needle, mode_basis(needle, 3))
+
+
 SCENES = {
     "entry": scene_of("entry", held(0.1), LAYERS, TIP, tissue=SWELLING),
     "entry, fixed-frame": scene_of("entry", held(0.1), LAYERS, TIP, tissue=SWELLING, model=Model(kinematics="fixed-frame")),
@@ -49,12 +55,12 @@ SCENES = {
     "hub, guides": scene_of("hub", held(0.1), LAYERS, POINTS, tissue=SWELLING, support=GUIDES),
 }
 ELEMENTS = {
-    f"elements of degree {degree}, {name}": Case(scene, _elements(7, degree))
+    f"elements of degree {degree}, {name}": Case(scene, _elements(7, degree), "fem")
     for degree in (3, 4)
     for name, scene in SCENES.items()
 }
 MODES = {
-    f"{count} modes, {basis}{', corrected' * corrections}, {name}": Case(scene, _modes(count, basis, corrections))
+    f"{count} modes, {basis}{', corrected' * corrections}, {name}": Case(scene, _modes(count, basis, corrections), "assumed-modes")
     for count, basis, corrections in (
         (2, "full-length", False),
         (4, "inserted-length", False),
@@ -64,4 +70,5 @@ MODES = {
     for name, scene in SCENES.items()
     if basis == "full-length" or "entry" in name
 }
-CASES = ELEMENTS | MODES
+PROJECTIONS = {f"projected, {name}": Case(scene, _projected, "projected") for name, scene in SCENES.items()}
+CASES = ELEMENTS | MODES | PROJECTIONS

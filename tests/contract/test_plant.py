@@ -252,4 +252,4 @@ def test_depth_at_which_the_needle_is_straight(case):
 
 
 def test_describe_names_the_model(case):
-    assert case.plant.describe()["model"] == case.plant.scene.model.kind
+    assert case.plant.describe()["model"] == case.name
