@@ -138,6 +138,7 @@ class Analysis:
             "outputs": [asdict(signal) for signal in first.outputs],
             "depths": [_plain(one) for one in self.points],
             "sign_changes": [asdict(change) for change in self.curve.sign_changes],
+            "warnings": list(self.plant.warnings),
         }
 
     def columns(self) -> Mapping[str, Sequence[Any]]:

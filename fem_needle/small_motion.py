@@ -121,7 +121,7 @@ def small_motion(plant: Plant, point: OperatingPoint, *, moves: bool) -> SmallMo
     point
         The operating point.
     moves
-        Whether the depth is a coordinate; where it is not, its row and column are only those of the inertia.
+        Whether the depth is a coordinate; where it is not, its row and column are incomplete.
     """
     dense, points = _dense(plant, point.depth, point.time), plant.points(point.depth)
     known = points.row_rates @ point.coordinates + points.flexibility_rate @ point.point_forces
@@ -132,7 +132,7 @@ def small_motion(plant: Plant, point: OperatingPoint, *, moves: bool) -> SmallMo
         subspace=plant.operators(point.depth, point.time).subspace,
     )
     if point.speed or np.any(point.accelerations):
-        motion = _with_speed(plant, point, dense, motion)
+        motion = _with_speed(plant, point, dense, motion, moves=moves)
     if not plant.axial_force_acts:
         return _without_axial_force(plant, point, motion)
     if moves:
@@ -195,7 +195,9 @@ def _at_rest(plant: Plant, point: OperatingPoint, dense: _Dense, points: Points)
     )
 
 
-def _with_speed(plant: Plant, point: OperatingPoint, dense: _Dense, motion: SmallMotion) -> SmallMotion:
+def _with_speed(
+    plant: Plant, point: OperatingPoint, dense: _Dense, motion: SmallMotion, *, moves: bool
+) -> SmallMotion:
     """Add what the speed, the velocities and the accelerations of the operating point contribute."""
     v, q, rate, twice = point.speed, point.coordinates, point.velocities, point.accelerations
     mass_rate, convection_rate, centrifugal_rate = kinetic_matrix_rates(plant, point.depth)
@@ -206,9 +208,9 @@ def _with_speed(plant: Plant, point: OperatingPoint, dense: _Dense, motion: Smal
     damping[0, 1:] += (dense.convection + dense.convection.T - mass_rate) @ rate + 2 * v * dense.centrifugal @ q
     damping[0, 0] += float(2 * rate @ dense.centrifugal @ q + v * q @ centrifugal_rate @ q)
     stiffness[1:, 1:] += v**2 * (convection_rate - dense.centrifugal) + v * dense.drag
-    stiffness[1:, 0] += mass_rate @ twice + numerical_rate(
-        lambda z: _moving_forces(plant, point, z), point.depth, plant.scene
-    )
+    if moves:
+        moving = numerical_rate(lambda z: _moving_forces(plant, point, z), point.depth, plant.scene)
+        stiffness[1:, 0] += mass_rate @ twice + moving
     stiffness[0, 1:] += dense.convection.T @ twice + 2 * v * dense.centrifugal @ rate + v**2 * centrifugal_rate @ q
     stiffness[0, 1:] += dense.drag.T @ rate + 2 * v * dense.slip @ q
     friction = plant.scene.friction

@@ -1,8 +1,8 @@
 """What the thesis says of controllability and observability (sections 3.2.5 to 3.2.7 and 5.1), tested point by point.
 
 States there: length outside d (here the depth), base rotation theta, amplitudes q1 and q2, and their rates; inputs: insertion
-force and base torque; output: the tip's deflection. Each statement is asked of the linear model at a straight needle, the operating
-point of 3.2.5, and at one that a tip force has bent, by the means of `fem_needle.controllability`.
+force and base torque; output: the tip's deflection. Each statement is asked of the linear model at a straight needle, the
+operating point of 3.2.5, and at one that a tip force has bent, by the means of `fem_needle.controllability`.
 """
 
 from __future__ import annotations

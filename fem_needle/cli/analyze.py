@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fem_needle.cli.scene_commands import SceneArgument
-from fem_needle.errors import SceneError
+from fem_needle.errors import ComputationError, SceneError
 
 if TYPE_CHECKING:
     from fem_needle.scene import Scene
@@ -116,8 +116,13 @@ def _analyze(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet
     folder.check()
     analysis = compute(scene, **wanted)
     plain = analysis.to_dict()
+    for warning in analysis.plant.warnings:
+        typer.echo(f"warning: {warning}", err=True)
     written = folder.write(scene, plain, analysis.columns(), analysis_picture(analysis))
-    write_atomically(written / f"{NAME}.mat", analysis_matlab(analysis))
+    try:
+        write_atomically(written / f"{NAME}.mat", analysis_matlab(analysis))
+    except OSError as error:
+        raise ComputationError(f"{written}: cannot be written: {error}") from error
     if quiet:
         typer.echo(json_bytes(plain).decode(), nl=False)
     else:

@@ -182,6 +182,33 @@ def test_wrong_input_writes_nothing(command, tmp_path, arguments, message):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_model_with_mistakes_warns(command):
+    options = ("--model", "assumed-modes", "--variant", "as-printed", "--set", "initial.shape=straight", "--depth", "100mm")
+    status, out, err = command("thesis", *options, "--json")
+    assert status == 0
+    assert err.splitlines() == [f"warning: {warning}" for warning in json.loads(out)["warnings"]]
+    assert "grows without bound" in err
+
+
+def test_assumed_modes_on_the_command_line(command, tmp_path):
+    options = ("--model", "assumed-modes", "--modes", "3", "--basis", "inserted-length")
+    status, out, _ = command("thesis", *options, "--depth", "100mm")
+    assert status == 0
+    assert "of 8 states" in out
+    plain = json.loads((tmp_path / "runs" / "thesis-analyze" / "analyze.json").read_text())
+    assert (plain["model"], plain["modes"], plain["basis"]) == ("assumed-modes", 3, "inserted-length")
+
+
+def test_files_that_cannot_be_written(command, monkeypatch):
+    def full(path, content):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("fem_needle.atomic_file.write_atomically", full)
+    status, _, err = command("release", *FEW)
+    assert status == 1
+    assert "No space left" in err
+
+
 def test_loads_that_vary_are_taken_at_a_time():
     ramp = Table(time=[0.0, 1.0], value=[0.0, 0.2])
     plant = FiniteElementNeedle(scene_of("entry", held(0.1), loads=[TipLoad(force=ramp)]), elements=3)
