@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 MILLIMETERS = 1e3
 PANEL_HEIGHT = 2.3  # inches
+WIDE = 20.0  # largest gain by the median one, from which a panel is linear around zero and logarithmic beyond
 # By the unit of the input: what a gain is shown in, and how many of it 1 m per SI unit is.
 SHOWN = {
     "N": ("tip per force [mm/N]", 1e3),
@@ -39,7 +40,8 @@ def analysis_picture(analysis: Analysis) -> bytes:
         panels[0].set_title("Answer of the tip at rest, by input")
         panels[-1].set_xlabel("depth [mm]")
         for panel in panels:
-            panel.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8, frameon=False)
+            if panel.get_legend_handles_labels()[0]:
+                panel.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8, frameon=False)
         return png_bytes(figure)
 
 
@@ -57,10 +59,25 @@ def _draw_gains(panel: Axes, curve: DepthGains, unit: str) -> None:
         marker = MARKERS[number % len(MARKERS)]
         panel.plot(zeros, np.zeros(len(zeros)), linestyle="none", marker=marker, color=color, markeredgecolor=INK, zorder=5)
     panel.set_ylabel(label)
+    sizes = factor * np.abs(curve.gains[:, chosen])
+    usual = float(np.median(sizes))
+    if 0.0 < WIDE * usual < float(np.max(sizes)):  # large values beside the surface would hide the zeros
+        panel.set_yscale("asinh", linear_width=usual)
+        decades = 10.0 ** np.arange(np.ceil(np.log10(2.0 * usual)), np.floor(np.log10(np.max(sizes))) + 1)
+        low, high = panel.get_ylim()
+        ticks = [tick for tick in (*-decades[::-1], 0.0, *decades) if low <= tick <= high]
+        panel.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+        panel.set_yticks([], minor=True)
 
 
 def _draw_frequencies(panel: Axes, curve: DepthGains) -> None:
+    if not np.any(np.isfinite(curve.frequencies)):
+        panel.text(0.5, 0.5, "no vibrations at a held depth", transform=panel.transAxes, ha="center")
+        panel.set_yticks([])
+        return
     for number, frequency in enumerate(curve.frequencies.T):
+        if not np.any(np.isfinite(frequency)):
+            continue
         label = f"{number + 1}. natural\nfrequency" if number == 0 else f"{number + 1}."
         line = LINES[number % len(LINES)]
         panel.plot(MILLIMETERS * curve.depths, frequency / (2 * pi), color=COLORS[number], linestyle=line, label=label)
