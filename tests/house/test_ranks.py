@@ -89,6 +89,11 @@ RANKS = {
     "convergence_rows": 16,
     "convergence": 17,
     "convergence_picture": 18,
+    "comparison_static": 13,
+    "comparison_range": 3,
+    "comparison_runs": 15,
+    "comparison_result": 16,
+    "comparison": 17,
     "cli": 20,
     "__main__": 21,
 }

@@ -1,0 +1,230 @@
+"""Compare models with a reference: at rest over the depth, through the run, where they may be trusted, what they cost.
+
+The reference and the models get the same scene, kinematics, analysis, time steps and samples; they are found by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.choices import choose
+from fem_needle.comparison_range import Interval, described, intervals_within
+from fem_needle.comparison_result import ComparedModel, Comparison, ModelAnswer
+from fem_needle.comparison_runs import TimedRun, run_errors, timed_run
+from fem_needle.comparison_static import StaticLoad, compared_depths, rest_states, static_errors, static_load
+from fem_needle.errors import SceneError
+from fem_needle.linearization import reach
+from fem_needle.loads import is_steady
+from fem_needle.models import build_plant, model_family
+from fem_needle.plant import Plant
+from fem_needle.scene import Scene
+from fem_needle.scene.settings import overriding
+from fem_needle.statics import solve_static
+
+Array = NDArray[np.float64]
+
+WITHIN = 0.01
+REFERENCE_SHARE = 1e-2  # of the smaller of tolerance and error of the ranges: tolerance of the reference's mesh
+SMALLEST_TOLERANCE = 1e-10
+DEFAULT_DEPTHS = 3
+WITHOUT_STATICS = "as-printed"
+
+
+@dataclass(frozen=True, eq=False)
+class _Setting:
+    """What all models share: the reference's scene with its elements, analysis, depths, loads at rest, steps."""
+
+    scene: Scene
+    analysis: str
+    has_statics: bool
+    load: StaticLoad
+    curve_depths: Array
+    depths: tuple[float, ...]
+    moves: bool
+
+    def steps(self, reference: TimedRun | None) -> dict[str, Any]:
+        """Return the settings of a run: of the reference's own, or those that it has run with."""
+        common: dict[str, Any] = {"analysis": self.analysis, "tolerance": self.scene.numerics.tolerance}
+        common["output_step"] = self.scene.numerics.output_step
+        return common | ({} if reference is None else {"time_step": reference.run.summary["time_step"]})
+
+
+def compare(
+    scene: Scene,
+    *,
+    reference: str = "fem",
+    model: str = "assumed-modes",
+    modes: Sequence[int] = (),
+    variant: str | None = None,
+    basis: str | None = None,
+    static_corrections: bool | None = None,
+    depths: Sequence[float] | None = None,
+    within: float = WITHIN,
+    elements: int | None = None,
+    time_step: float | None = None,
+) -> Comparison:
+    """Compare a model, with several numbers of modes, with a reference.
+
+    Parameters
+    ----------
+    scene
+        What is compared. Its kinematics, or those that the variant implies, are taken on both sides.
+    reference, model
+        "fem", "assumed-modes" or other installed models.
+    modes
+        Numbers of modes, a compared model each; default: one, as the scene says.
+    variant, basis, static_corrections
+        Of the compared models; default: as the scene says. ``"as-printed"`` has no equilibria: its run alone is compared.
+    depths
+        At which shapes and figures are given [m]; default: three over the range.
+    within
+        Error of the tip at rest (1) for which the range of depth is found.
+    elements
+        Of the reference; default: those of the scene, else as many as a hundredth of the tolerance (or of ``within``) needs.
+    time_step
+        Largest step of all runs [s]; default: that of the scene, else the reference's automatic choice.
+
+    Raises
+    ------
+    SceneError
+        If a value is out of range, or a model cannot have what the scene asks for.
+    ComputationError
+        If the reference, or a model at rest, cannot be computed.
+    """
+    _check(modes, within)
+    given = {"numerics.elements": elements, "numerics.time_step": time_step}
+    base = scene.with_values(overriding({path: value for path, value in given.items() if value is not None}))
+    choice = {"variant": variant, "basis": basis, "static_corrections": static_corrections}
+    values = {"model.kind": model} | {f"model.{key}": value for key, value in choice.items() if value is not None}
+    scenes = [base.with_values(values | {"model.modes": count}) for count in modes] or [base.with_values(values)]
+    plain = {"model.kind": reference, "model.variant": None, "model.kinematics": scenes[0].model.kinematics}
+    true_scene, plant, error = _reference(base.with_values(plain), scenes[0].model.variant == WITHOUT_STATICS, within)
+    setting = _setting(true_scene, plant, scenes[0].model.variant != WITHOUT_STATICS, depths)
+    held = {"numerics.analysis": true_scene.numerics.analysis, "numerics.output_step": true_scene.numerics.output_step}
+    held |= overriding({"numerics.elements": true_scene.numerics.elements}) if true_scene.numerics.mesh is None else {}
+    truth, true_plant = _answer(setting, true_scene, None)
+    compared = tuple(_compared(setting, one.with_values(held), truth, true_plant, within) for one in scenes)
+    _refuse_equal(compared)
+    return Comparison(
+        scene=scene,
+        reference=truth,
+        reference_error=error,
+        models=compared,
+        kinematics=true_scene.model.kinematics,
+        analysis=setting.analysis,
+        load=setting.load if setting.has_statics else None,
+        depths=setting.depths,
+        within=within,
+    )
+
+
+def _check(modes: Sequence[int], within: float) -> None:
+    mistakes = []
+    if len(set(modes)) < len(modes):
+        mistakes.append(f"modes: a number is given twice (got {', '.join(map(str, modes))}; allowed numbers that differ)")
+    if not 0.0 < within < 1.0:
+        mistakes.append(f"within: out of range (got {within:g}; allowed above 0 and below 1)")
+    if mistakes:
+        raise SceneError(mistakes)
+
+
+def _refuse_equal(compared: Sequence[ComparedModel]) -> None:
+    """Refuse numbers of modes that a model does not know."""
+    if len(compared) > 1 and "modes" not in compared[0].answer.description:
+        kind = compared[0].answer.description.get("model", compared[0].answer.label)
+        raise SceneError(f"modes: the model {kind!r} does not change with them (got {len(compared)} numbers; allowed none)")
+
+
+def _reference(scene: Scene, dynamic: bool, within: float) -> tuple[Scene, Plant, float | None]:
+    """Return the reference's scene with its analysis, samples and elements, its plant and the error of its mesh."""
+    if dynamic and scene.numerics.analysis == "auto":
+        scene = scene.with_value("numerics.analysis", "dynamic")
+    family = model_family(scene.model.kind)
+    choice = choose(scene, lambda: family.pilot(scene))
+    scene = scene.with_values({"numerics.analysis": choice.analysis, "numerics.output_step": choice.output_step})
+    finest = max(REFERENCE_SHARE * min(within, scene.numerics.tolerance), SMALLEST_TOLERANCE)
+    chosen = family.choose(scene.with_value("numerics.tolerance", finest), choice.analysis)
+    elements = chosen.plant.describe().get("elements")
+    if elements is not None and scene.numerics.mesh is None:
+        scene = scene.with_value("numerics.elements", elements)
+    return scene, build_plant(scene), chosen.error
+
+
+def _setting(scene: Scene, plant: Plant, has_statics: bool, depths: Sequence[float] | None) -> _Setting:
+    curve = compared_depths(scene, plant.smallest_depth)
+    default = np.linspace(curve[0], curve[-1], DEFAULT_DEPTHS)
+    chosen = tuple(float(depth) for depth in (default if depths is None else depths))
+    least, most = plant.smallest_depth, reach(scene)
+    if not chosen or len(set(chosen)) < len(chosen) or not all(max(least, 0.0) < depth <= most for depth in chosen):
+        shown = ", ".join(f"{depth:g}" for depth in chosen)
+        raise SceneError(f"depths: got {shown or 'none'}; allowed different depths above {least:g} to {most:g} m")
+    analysis = scene.numerics.analysis
+    moves = analysis != "static" and not _rests(scene)
+    if not moves and not has_statics:
+        raise SceneError(f"model.variant: '{WITHOUT_STATICS}' has no equilibrium, and nothing moves in this scene")
+    load = static_load(plant) if has_statics else StaticLoad(0.0, 0.0)
+    return _Setting(scene, analysis, has_statics, load, curve, chosen, moves)
+
+
+def _rests(scene: Scene) -> bool:
+    """Return whether nothing ever moves."""
+    rests = scene.insertion.kind == "hold" and is_steady(scene)
+    return rests and scene.initial.shape == "equilibrium" and scene.tissue.rest_line == "straight"
+
+
+def _answer(setting: _Setting, scene: Scene, truth: ModelAnswer | None) -> tuple[ModelAnswer, Plant]:
+    """Return what a model answers (the reference, where there is no truth yet), and the plant of its equilibria."""
+    plant = build_plant(scene)
+    still = plant if not setting.load.probe_force else build_plant(setting.load.applied(scene))
+    chosen = curve = run = None
+    if setting.has_statics:
+        chosen = rest_states(still, setting.depths, setting.load.time)
+        curve = rest_states(still, setting.curve_depths, setting.load.time)
+    if setting.moves:
+        run = timed_run(plant, may_fail=truth is not None, **setting.steps(None if truth is None else truth.run))
+    warnings = tuple(run.run.summary["warnings"]) if run is not None else plant.warnings
+    description = dict(plant.describe())
+    answer = ModelAnswer(
+        label=_label(description, scene.model.kind),
+        description=description,
+        unknowns=plant.size - plant.prescribed,
+        chosen=chosen,
+        curve=curve,
+        run=run,
+        warnings=warnings if run is None or not run.failure else (*warnings, run.failure),
+    )
+    return answer, still
+
+
+def _label(description: dict[str, Any], kind: str) -> str:
+    if "modes" not in description:
+        return kind
+    return f"{description['modes']} mode{'s' if description['modes'] != 1 else ''}"
+
+
+def _compared(setting: _Setting, scene: Scene, truth: ModelAnswer, true_plant: Plant, within: float) -> ComparedModel:
+    answer, plant = _answer(setting, scene, truth)
+    chosen, curve = (
+        None if found is None or exact is None else static_errors(found, exact, scene)
+        for found, exact in ((answer.chosen, truth.chosen), (answer.curve, truth.curve))
+    )
+    run = None if answer.run is None or truth.run is None else run_errors(answer.run, truth.run)
+    return ComparedModel(answer, chosen, curve, _ranges(setting, true_plant, plant, within), run)
+
+
+def _ranges(setting: _Setting, true_plant: Plant, plant: Plant, within: float) -> tuple[Interval, ...]:
+    """Return where the tip at rest is within the error; none of a model without statics."""
+    if not setting.has_statics:
+        return ()
+    time = setting.load.time
+
+    def tips(depth: float) -> tuple[float, float]:
+        found = (solve_static(one, depth=depth, time=time).tip_deflection for one in (true_plant, plant))
+        return next(found), next(found)
+
+    return described(setting.scene, time, intervals_within(tips, setting.curve_depths, within))

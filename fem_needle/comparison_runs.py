@@ -1,0 +1,174 @@
+"""Two models through the same run on the same times: tips, shapes, energies, their differences, and what each costs."""
+
+from __future__ import annotations
+
+import time as clock
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.comparison_static import shape_stations
+from fem_needle.errors import ComputationError
+from fem_needle.plant import Plant
+from fem_needle.samples import Sample
+from fem_needle.simulation import simulate
+from fem_needle.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+ENERGIES = ("kinetic_energy", "bending_energy", "tissue_energy")
+SAME_TIME = 1e-9  # of the run
+
+
+@dataclass(frozen=True, eq=False)
+class TimedRun:
+    """A run and what it took.
+
+    Attributes
+    ----------
+    run
+        The trajectory; of a failed run, what was computed before.
+    solve_time
+        Of the steps, from the first sample to the last [s]; of a step that was chosen, of its last run alone.
+    failure
+        Why it stopped before its end; empty where it did not.
+    """
+
+    run: Trajectory
+    solve_time: float
+    failure: str = ""
+
+    @property
+    def energy(self) -> Array:
+        """Kinetic, bending and tissue energy together [J], shape (nt,)."""
+        return np.asarray(sum(self.run.series[name] for name in ENERGIES), dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class RunErrors:
+    """Differences of a run from the reference's, at the samples that both have.
+
+    Attributes
+    ----------
+    time, depth
+        Times [s] and the reference's depths [m], shape (nt,).
+    tip
+        (w - w_ref) / max |w_ref| at the tip (1), the largest over the whole run, shape (nt,).
+    shape
+        |w - w_ref| / max |w_ref|, root mean squares along the part that bends (1), shape (nt,).
+    depth_difference
+        Largest difference of the depths [m]; 0 in a prescribed motion.
+    energies
+        Largest difference of each energy, and of ``total_energy``, by the reference's largest total energy (1).
+    """
+
+    time: Array
+    depth: Array
+    tip: Array
+    shape: Array
+    depth_difference: float
+    energies: dict[str, float]
+
+    @property
+    def largest_tip(self) -> float:
+        """Largest |tip error| (1)."""
+        return float(np.max(np.abs(self.tip)))
+
+
+class _Stopwatch:
+    """Watches a run and forgets all but its last refinement."""
+
+    def __init__(self) -> None:
+        self.started = self.ended = clock.perf_counter()
+        self._fraction = 0.0
+
+    def begin(self, plant: Plant, choice: dict[str, Any]) -> None:
+        """Ignore."""
+
+    def progress(self, fraction: float) -> None:
+        """Start again where a run does."""
+        now = clock.perf_counter()
+        if fraction <= self._fraction:
+            self.started = now
+        self._fraction, self.ended = fraction, now
+
+    def sample(self, sample: Sample) -> None:
+        """Ignore."""
+
+
+def timed_run(plant: Plant, *, may_fail: bool = False, **settings: Any) -> TimedRun:
+    """Run a plant through its scene.
+
+    Parameters
+    ----------
+    plant
+        The model.
+    may_fail
+        Whether a run that fails on its way is an answer: what it computed.
+    settings
+        Of `fem_needle.simulate`.
+
+    Raises
+    ------
+    ComputationError
+        If the run fails.
+    KeyboardInterrupt
+        Also where the run itself would end in order: half a run must not pass for one.
+    """
+    watch = _Stopwatch()
+    try:
+        run, failure = simulate(plant, observer=watch, **settings), ""
+    except ComputationError as error:
+        if not may_fail or error.partial is None:
+            raise
+        run, failure = error.partial, str(error)
+    if run.summary["stop_reason"] == "interrupted":
+        raise KeyboardInterrupt
+    return TimedRun(run, watch.ended - watch.started, failure)
+
+
+def run_errors(found: TimedRun, reference: TimedRun) -> RunErrors:
+    """Return the differences at the samples that both runs have."""
+    run, true = found.run, reference.run
+    count = _common(run, true)
+    floor = true.scene.numerics.absolute_tolerance
+    tip_scale = max(float(np.max(np.abs(true.tip_deflection))), floor)
+    shape_scale, shapes = _shape_norms(run, true, count)
+    energy_scale = float(np.max(reference.energy)) or 1.0
+    gaps = {name: run.series[name][:count] - true.series[name][:count] for name in ENERGIES}
+    gaps["total_energy"] = found.energy[:count] - reference.energy[:count]
+    return RunErrors(
+        true.time[:count],
+        true.depth[:count],
+        (run.tip_deflection[:count] - true.tip_deflection[:count]) / tip_scale,
+        shapes / max(shape_scale, floor * np.sqrt(true.scene.needle.length)),
+        float(np.max(np.abs(run.depth[:count] - true.depth[:count]))),
+        {name: float(np.max(np.abs(gap))) / energy_scale for name, gap in gaps.items()},
+    )
+
+
+def _common(run: Trajectory, true: Trajectory) -> int:
+    """Return how many leading samples have the same times: a push may end at slightly different ones."""
+    count = min(len(run.time), len(true.time))
+    same = np.abs(run.time[:count] - true.time[:count]) <= SAME_TIME * true.time[-1]
+    return count if same.all() else int(np.argmin(same))
+
+
+def _shape_norms(run: Trajectory, true: Trajectory, count: int) -> tuple[float, Array]:
+    """Return the largest norm of the reference's shape and the norms of the differences [m^1.5], shape (count,)."""
+    norms, largest = np.zeros(count), 0.0
+    for row in range(count):
+        stations, weights = shape_stations(true.scene, float(true.depth[row]))
+        exact = shape_at(true, row, stations)
+        largest = max(largest, float(np.sqrt(weights @ exact**2)))
+        norms[row] = np.sqrt(weights @ (shape_at(run, row, stations) - exact) ** 2)
+    return largest, norms
+
+
+def shape_at(run: Trajectory, row: int, stations: Array) -> Array:
+    """Return the deflection [m] of one sample of a run that was not loaded, at arc lengths [m]."""
+    if run.plant is None or run.coordinates is None or run.point_forces is None:
+        raise ComputationError("a run that was loaded from files has no model (compare runs as they are computed)")
+    return run.plant.deflection(run.coordinates[row], run.point_forces[row], float(run.depth[row]), stations)
