@@ -76,6 +76,10 @@ def run_scene(
     scene: Scene,
     *,
     model: str | None = None,
+    modes: int | None = None,
+    variant: str | None = None,
+    basis: str | None = None,
+    static_corrections: bool | None = None,
     elements: int | None = None,
     mesh: str | Path | ArrayLike | None = None,
     degree: int | None = None,
@@ -93,6 +97,8 @@ def run_scene(
         What to run. Every other argument overrides its ``[model]`` or ``[numerics]`` value.
     model
         "fem", "assumed-modes" or another installed model.
+    modes, variant, basis, static_corrections
+        Of the assumed modes.
     elements, degree
         Mesh; default: chosen from the tolerance.
     mesh
@@ -122,6 +128,10 @@ def run_scene(
     """
     values = {
         "model.kind": model,
+        "model.modes": modes,
+        "model.variant": variant,
+        "model.basis": basis,
+        "model.static_corrections": static_corrections,
         "numerics.elements": elements,
         "numerics.mesh": None if mesh is None else mesh_positions(mesh).tolist(),
         "numerics.degree": degree,
@@ -250,7 +260,8 @@ def _warnings(job: _Job) -> list[str]:
     radius, asked = _spectral_radius(job), job.scene.numerics.spectral_radius
     if job.choice.analysis == "dynamic" and radius < asked:
         found.append(
-            f"numerics.spectral_radius = {asked:g} > {radius:g}, with which this model stays stable while it moves: {radius:g} is used"
+            f"numerics.spectral_radius = {asked:g} > {radius:g}, with which this model stays stable while it moves: "
+            f"{radius:g} is used"
         )
     return found
 

@@ -21,6 +21,16 @@ RUNS = Path("runs")
 
 Text = str | None
 
+VARIANTS = "Of the assumed modes: conservative, corrected or as-printed."
+BASES = "Assumed modes of the full-length or of the inserted-length."
+Folder = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Run folder; by default runs/<name>, then runs/<name>-2, ...")
+]
+Assignments = Annotated[
+    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the scene; may be repeated.")
+]
+CORRECTIONS = "Let the static responses to loads join the assumed modes."
+
 
 def register(application: typer.Typer) -> None:
     """Add the command."""
@@ -29,11 +39,13 @@ def register(application: typer.Typer) -> None:
 
 def run(
     scene: SceneArgument,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Run folder; by default runs/<name>, then runs/<name>-2, ...")
-    ] = None,
+    out: Folder = None,
     force: Annotated[bool, typer.Option("--force", help="Replace the run in DIR.")] = False,
-    model: Annotated[Text, typer.Option(metavar="KIND", help="fem.")] = None,
+    model: Annotated[Text, typer.Option(metavar="KIND", help="fem, assumed-modes or another installed model.")] = None,
+    modes: Annotated[Text, typer.Option(metavar="N", help="How many assumed modes.")] = None,
+    variant: Annotated[Text, typer.Option(metavar="NAME", help=VARIANTS)] = None,
+    basis: Annotated[Text, typer.Option(metavar="NAME", help=BASES)] = None,
+    static_corrections: Annotated[bool, typer.Option("--static-corrections", help=CORRECTIONS)] = False,
     elements: Annotated[Text, typer.Option(metavar="N", help="Elements over the part that bends, or auto.")] = None,
     mesh: Annotated[Path | None, typer.Option(metavar="FILE", help="Line mesh of the needle, in place of elements.")] = None,
     degree: Annotated[Text, typer.Option(metavar="N", help="Polynomial degree of an element, 3 or 4.")] = None,
@@ -41,9 +53,7 @@ def run(
     tolerance: Annotated[Text, typer.Option(metavar="X", help="Tip error / largest tip deflection to aim at.")] = None,
     analysis: Annotated[Text, typer.Option(metavar="KIND", help="auto, dynamic, quasi-static or static.")] = None,
     output_step: Annotated[Text, typer.Option(metavar="TIME", help="Time between samples, or auto.")] = None,
-    assignments: Annotated[
-        list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Change a value of the scene; may be repeated.")
-    ] = None,
+    assignments: Assignments = None,
     no_vtk: Annotated[bool, typer.Option("--no-vtk", help="Write no frames for ParaView.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json and nothing else.")] = False,
     explain: Annotated[bool, typer.Option("--explain", help="Say what each row of the table means.")] = False,
@@ -56,16 +66,13 @@ def run(
     from fem_needle.run_target import RunTarget
     from fem_needle.scene_file import load_scene
 
-    options = {
-        "model.kind": model,
-        "numerics.elements": elements,
-        "numerics.mesh": None if mesh is None else _positions(mesh),
-        "numerics.degree": degree,
-        "numerics.time_step": time_step,
-        "numerics.tolerance": tolerance,
-        "numerics.analysis": analysis,
-        "numerics.output_step": output_step,
-    }
+    model_keys = {"kind": model, "modes": modes, "variant": variant, "basis": basis}
+    numerics_keys = {"elements": elements, "degree": degree, "time_step": time_step, "tolerance": tolerance}
+    options: dict[str, Any] = {f"model.{key}": value for key, value in model_keys.items()}
+    options |= {f"numerics.{key}": value for key, value in numerics_keys.items()}
+    options |= {"numerics.analysis": analysis, "numerics.output_step": output_step}
+    options["numerics.mesh"] = None if mesh is None else _positions(mesh)
+    options["model.static_corrections"] = static_corrections or None
     loaded = changed(load_scene(scene), assignments or (), options)
     target = RunTarget(RUNS / Path(scene).stem if out is None else out, force, numbered=out is None)
     target.check()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,8 @@ EXPLANATION = (
         "analysis",
         "dynamic: with inertia; quasi-static: without; static: a series of equilibria. --analysis chooses, else the tolerance.",
     ),
-    ("elements, time step", "--elements, --degree and --time-step choose, else the tolerance."),
+    ("model", "--model, --modes, --variant, --basis and --static-corrections choose; elements: --elements, --degree, --mesh."),
+    ("time step", "--time-step chooses, else the tolerance."),
     ("left out", "terms of the equation of motion that do not matter here, each with its reason."),
     ("run folder", "scene.toml repeats the run; summary.json has this table in SI; series.nc everything over time."),
 )
@@ -41,7 +42,8 @@ def run_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str]) -> It
     yield "energy residual", f"{summary['relative_energy_residual']:.1e} of the largest lateral energy"
     yield "error estimate", _estimate(summary.get("error_estimate"), run.scene.numerics.tolerance)
     yield "analysis", str(summary["analysis"])
-    yield "elements, time step", _discretization(summary)
+    yield "model", model_text(summary)
+    yield "time step", f"{summary['steps']} steps of up to {summary['time_step']:.4g} s"
     for index, skipped in enumerate(summary.get("skipped", ())):
         yield "" if index else "left out", f"{skipped['term']}: {skipped['reason']}"
     for warning in summary.get("warnings", ()):
@@ -59,6 +61,14 @@ def _estimate(estimate: float | None, tolerance: float) -> str:
     return f"{estimate:.1e} of the largest tip deflection (tolerance {tolerance:.1e})"
 
 
-def _discretization(summary: dict[str, Any]) -> str:
-    degree = f" of degree {summary['degree']}" if "degree" in summary else ""
-    return f"{summary.get('elements', '?')}{degree}; {summary['steps']} steps of up to {summary['time_step']:.4g} s"
+def model_text(description: Mapping[str, Any]) -> str:
+    """Return a model in words: kind, and elements or modes, variant and basis where it has any."""
+    parts = [str(description.get("model", "?"))]
+    if "elements" in description:
+        degree = f" of degree {description['degree']}" if "degree" in description else ""
+        parts.append(f"{description['elements']} elements{degree}")
+    if "modes" in description:
+        parts.append(f"{description['modes']} mode{'s' if description['modes'] != 1 else ''}")
+    if description.get("static_corrections"):
+        parts.append(f"{description['static_corrections']} static corrections")
+    return ", ".join([*parts, *(f"{key} {description[key]}" for key in ("variant", "basis") if key in description)])

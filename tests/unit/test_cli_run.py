@@ -42,12 +42,14 @@ def test_a_run_shows_a_table_and_leaves_a_folder(run, tmp_path):
     status, out, err = run("thesis", *SHORT)
     assert (status, err) == (0, "")
     loaded = load_run(tmp_path / "runs" / "thesis")
-    rows = {line[:24].strip(): line[24:].strip() for line in out.splitlines() if line.strip()}
+    rows = {name: value for name, _, value in (line.strip().partition("  ") for line in out.splitlines())}
+    rows = {name: value.strip() for name, value in rows.items()}
     assert "Thesis needle" in out
     assert rows["depth"].startswith("40 mm at 2 s")
     assert rows["tip deflection"].startswith(f"{1e3 * loaded.tip_deflection[-1]:.4g} mm")
     assert rows["analysis"] == loaded.summary["analysis"]
-    assert rows["elements, time step"].startswith("4 of degree 4")
+    assert rows["model"] == "fem, 4 elements of degree 4"
+    assert rows["time step"] == "4 steps of up to 0.5 s"
     assert rows["left out"].startswith("inertia: ")
     assert rows["run folder"] == str(Path("runs/thesis"))
     assert "Warp By Vector" in rows["ParaView"]
