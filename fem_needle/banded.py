@@ -79,8 +79,8 @@ def to_dense(band: Array) -> Array:
 def _dense_view(band: Array) -> Array:
     """Return a full matrix inside its band storage: A[i, j] lies at offset b + i + 2 b j in memory."""
     size, middle = band.shape[1], half_bandwidth(band)
-    flat = band.ravel(order="K")[middle:]
-    return np.lib.stride_tricks.as_strided(flat, (size, size), (flat.itemsize, 2 * middle * flat.itemsize))
+    flat = band.ravel(order="K")
+    return np.ndarray((size, size), flat.dtype, flat, middle * flat.itemsize, (flat.itemsize, 2 * middle * flat.itemsize))
 
 
 def multiply(band: Array, vector: Array) -> Array:

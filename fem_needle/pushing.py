@@ -28,7 +28,8 @@ from fem_needle.steppers import DynamicStepper, Step
 Array = NDArray[np.float64]
 
 MOST_ITERATIONS = 60
-SPEED_TOLERANCE = 1e-13  # of the largest speed of a step
+SPEED_TOLERANCE = 1e-15  # of the largest speed of a step
+SPEED_ROUNDING = 1e-12  # of the largest speed: an iteration that no longer approaches below it has met rounding
 LAYER_SIDE = 1e-11  # of the depth: far enough from an interface to be in the layer that the tip moves in
 TIME_RESOLUTION = 1e-9  # of a step: how closely an event's time is found (the state lands on it exactly)
 
@@ -157,16 +158,16 @@ class Pusher:
 
     def _slide(self, state: PushState, until: float, last: Step | None, direction: int) -> PushStep:
         method, length = self.stepper.method, until - state.time
-        speeds = np.full(4, state.speed)
+        speeds, before = np.full(4, state.speed), inf
         for _ in range(MOST_ITERATIONS):
             motion = StepMotion(method, state.time, length, state.depth, speeds, direction)
             start = self.stepper.start(motion, state.time, until, state.end)
             last = self.stepper.advance(motion, start, until, last)
             found, forces = self._speeds(last, state, direction)
-            change = np.max(np.abs(found - speeds))
-            speeds = found
-            if change <= SPEED_TOLERANCE * np.max(np.abs(speeds)):
+            change, largest = float(np.max(np.abs(found - speeds))), float(np.max(np.abs(found)))
+            if change <= SPEED_TOLERANCE * largest or before <= change <= SPEED_ROUNDING * largest:
                 return self._slid(state, last, motion, forces)
+            speeds, before = found, change
         raise FloatingPointError("the insertion speed does not converge")
 
     def _speeds(self, step: Step, state: PushState, direction: int) -> tuple[Array, _AxialForces]:

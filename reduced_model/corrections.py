@@ -153,9 +153,8 @@ def _unit_responses(plant: FiniteElementNeedle, depth: float, time: float, stret
     operators, points = plant.operators(depth, time), plant.points(depth)
     for case in _unit_cases(plant, load_case(plant.scene, depth, time)):
         coordinates, forces = static_state(plant, operators, points, case, depth=depth, time=time)
-        if np.any(case.clamp):
-            coordinates = coordinates - plant.straight(*case.clamp)
-        yield Response(plant, depth, coordinates, forces, stretch)
+        clamp = coordinates[:2]  # a hub that turns has an angle of its own
+        yield Response(plant, depth, coordinates - plant.straight(float(clamp[0]), float(clamp[1])), forces, stretch)
 
 
 def _unit_cases(plant: Plant, case: LoadCase) -> Iterator[LoadCase]:

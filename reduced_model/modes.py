@@ -34,13 +34,14 @@ class ClampedFreeModes:
         L [m], or 1 for the fraction of a length.
     count
         How many modes.
-    roots
-        B_i (1), shape (count,).
+    roots, slope_ratios
+        B_i and s_i (1), shape (count,).
     """
 
     length: float
     count: int
     roots: Array = field(init=False)
+    slope_ratios: Array = field(init=False)
     _growth: Array = field(init=False)
 
     def __post_init__(self) -> None:
@@ -48,17 +49,14 @@ class ClampedFreeModes:
         small, sine, cosine = np.exp(-roots), np.sin(roots), np.cos(roots)
         object.__setattr__(self, "roots", roots)
         # (1 - s) exp(B), of order one.
-        object.__setattr__(self, "_growth", 2 * (sine - cosine - small) / (1 + 2 * sine * small - small**2))
+        growth = 2 * (sine - cosine - small) / (1 + 2 * sine * small - small**2)
+        object.__setattr__(self, "_growth", growth)
+        object.__setattr__(self, "slope_ratios", 1 - growth * small)
 
     @property
     def wavenumbers(self) -> Array:
         """B_i / L [1/m], shape (count,)."""
         return self.roots / self.length
-
-    @property
-    def slope_ratios(self) -> Array:
-        """The s_i (1), shape (count,)."""
-        return 1 - self._growth * np.exp(-self.roots)
 
     def values(self, positions: Array, derivative: int = 0) -> Array:
         """Return phi_i, or a derivative by position, at positions 0..L.
@@ -103,5 +101,7 @@ def _near(arguments: Array, ratios: Array, derivative: int) -> Array:
     difference = 2 * (np.sinh(arguments / 2) ** 2 + np.sin(arguments / 2) ** 2)  # cosh - cos
     if derivative == 1:
         return np.asarray(np.sinh(arguments) + np.sin(arguments) - ratios * difference, dtype=float)
-    odd = sum(2 * arguments ** (4 * k + 3) / factorial(4 * k + 3) for k in range(_SERIES_TERMS))
-    return np.asarray(difference - ratios * odd, dtype=float)
+    quartic, odd = arguments**4, np.zeros_like(arguments)  # sinh - sin, by Horner's rule
+    for k in reversed(range(_SERIES_TERMS)):
+        odd = odd * quartic + 2 / factorial(4 * k + 3)
+    return np.asarray(difference - ratios * odd * arguments**3, dtype=float)

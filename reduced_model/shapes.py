@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from math import ceil, pi
 from typing import ClassVar, Protocol
@@ -20,6 +20,7 @@ from reduced_model.modes import ClampedFreeModes
 Array = NDArray[np.float64]
 
 GAUSS_POINTS = 16
+KEPT = 16  # values at recent places
 WAVES_PER_PANEL = 1.0  # of the shortest mode: its square is integrated to rounding by 16 points
 
 
@@ -88,6 +89,8 @@ class LineShapes:
         The sets; a `RigidSet` first where there is a clamp.
     offset
         Place of the line's start as the power x^p of an integral counts it; the functions themselves do not move.
+    row, gauss_values
+        Values (size,) at a place, and (size, 16) at the Gauss points between two places, or a derivative; the last ones are kept.
     """
 
     span: float
@@ -95,8 +98,13 @@ class LineShapes:
     offset: float = 0.0
     breaks: Array = field(init=False)
     quadrature_points: ClassVar[int] = GAUSS_POINTS
+    row: Callable[..., Array] = field(init=False, repr=False)
+    gauss_values: Callable[[float, float, int], Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        # Several matrices of one depth need the same values.
+        object.__setattr__(self, "row", lru_cache(KEPT)(self._row))
+        object.__setattr__(self, "gauss_values", lru_cache(KEPT)(self._gauss_values))
         breaks = np.unique(np.concatenate([[0.0, self.span], *(part.breaks for part in self.sets)]))
         object.__setattr__(self, "breaks", _without_slivers(breaks[(breaks >= 0) & (breaks <= self.span)]))
 
@@ -115,9 +123,14 @@ class LineShapes:
         places = np.asarray(positions, dtype=float)
         return np.concatenate([part.values(places, derivative) for part in self.sets])
 
-    def row(self, position: float, derivative: int = 0) -> Array:
+    def _row(self, position: float, derivative: int = 0) -> Array:
         """Return the values (size,), or a derivative, at one place."""
-        return self.values(np.array([position]), derivative)[:, 0]
+        return _unwritable(self.values(np.array([position]), derivative)[:, 0])
+
+    def _gauss_values(self, start: float, end: float, derivative: int) -> Array:
+        """Return all functions (size, points), or a derivative, at the Gauss points between two places."""
+        points, _ = gauss_rule(GAUSS_POINTS)
+        return _unwritable(self.values(start + (end - start) * points, derivative))
 
     def weighted_sum(self, positions: Array, weights: Array, derivative: int = 0) -> Array:
         """Return the sum over places of weight times function (size,)."""
@@ -182,18 +195,19 @@ class GaussIntegrals:
 
     def _part(self, start: float, end: float) -> Array:
         points, weights = gauss_rule(GAUSS_POINTS)
-        positions = start + (end - start) * points
-        left, right = self._factors(positions)
-        return np.asarray((left * (weights * (end - start))) @ right.T, dtype=float)
+        values = self.shapes.gauss_values
+        orders = {"mass": (0, 0), "drag": (0, 1), "slip": (1, 1), "bending": (2, 2)}[self.kind]
+        left, right = (values(start, end, order) for order in orders)
+        weights = weights * (end - start)
+        exponent = self.power * {"drag": 1, "slip": 2}.get(self.kind, 0)
+        if exponent:
+            weights = weights * (start + (end - start) * points + self.shapes.offset) ** exponent
+        return np.asarray((left * weights) @ right.T, dtype=float)
 
-    def _factors(self, positions: Array) -> tuple[Array, Array]:
-        if self.kind in {"mass", "bending"}:
-            values = self.shapes.values(positions, 0 if self.kind == "mass" else 2)
-            return values, values
-        slopes = self.shapes.values(positions, 1)
-        if self.power:
-            slopes = slopes * (positions + self.shapes.offset) ** self.power
-        return (self.shapes.values(positions) if self.kind == "drag" else slopes), slopes
+
+def _unwritable(values: Array) -> Array:
+    values.flags.writeable = False
+    return values
 
 
 def _without_slivers(breaks: Array) -> Array:

@@ -39,8 +39,11 @@ def _elements(count: int, degree: int) -> Callable[[Scene], Plant]:
     return lambda scene: FiniteElementNeedle(scene, elements=count, degree=degree)
 
 
-def _modes(count: int, basis: str, corrections: bool) -> Callable[[Scene], Plant]:
-    return lambda scene: AssumedModeNeedle(scene, modes=count, basis=basis, static_corrections=corrections)
+def _modes(count: int, basis: str, corrections: bool, scene: Scene) -> Case:
+    def make(scene: Scene) -> Plant:
+        return AssumedModeNeedle(scene, modes=count, basis=basis, static_corrections=corrections)
+
+    return Case(scene, make, "assumed-modes")
 
 
 def _projected(scene: Scene) -> Plant:
@@ -60,7 +63,7 @@ ELEMENTS = {
     for name, scene in SCENES.items()
 }
 MODES = {
-    f"{count} modes, {basis}{', corrected' * corrections}, {name}": Case(scene, _modes(count, basis, corrections), "assumed-modes")
+    f"{count} modes, {basis}{', corrected' * corrections}, {name}": _modes(count, basis, corrections, scene)
     for count, basis, corrections in (
         (2, "full-length", False),
         (4, "inserted-length", False),
@@ -70,5 +73,7 @@ MODES = {
     for name, scene in SCENES.items()
     if basis == "full-length" or "entry" in name
 }
-PROJECTIONS = {f"projected, {name}": Case(scene, _projected, "projected") for name, scene in SCENES.items()}
+PROJECTIONS = {
+    f"projected, {name}": Case(scene, _projected, "projected") for name, scene in SCENES.items()
+}
 CASES = ELEMENTS | MODES | PROJECTIONS
