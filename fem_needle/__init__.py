@@ -17,6 +17,7 @@ _HOMES = {
     "ConvergenceStudy": "fem_needle.convergence",
     "FiniteElementNeedle": "fem_needle.needle",
     "solve_static": "fem_needle.statics",
+    "build_plant": "fem_needle.models",
     "linearize": "fem_needle.linearization",
     "LinearModel": "fem_needle.linear_model",
     "analyze": "fem_needle.analysis",
