@@ -15,6 +15,8 @@ _HOMES = {
     "simulate": "fem_needle.simulation",
     "converge": "fem_needle.convergence",
     "ConvergenceStudy": "fem_needle.convergence",
+    "compare": "fem_needle.comparison",
+    "Comparison": "fem_needle.comparison_result",
     "FiniteElementNeedle": "fem_needle.needle",
     "solve_static": "fem_needle.statics",
     "build_plant": "fem_needle.models",

@@ -6,7 +6,7 @@ The reference and the models get the same scene, kinematics, analysis, time step
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def compare(
     variant, basis, static_corrections
         Of the compared models; default: as the scene says. ``"as-printed"`` has no equilibria: its run alone is compared.
     depths
-        At which shapes and figures are given [m]; default: three over the range.
+        At which shapes and figures are given [m]; default: first and last of the range, and its middle or where it is held.
     within
         Error of the tip at rest (1) for which the range of depth is found.
     elements
@@ -103,8 +103,9 @@ def compare(
     values = {"model.kind": model} | {f"model.{key}": value for key, value in choice.items() if value is not None}
     scenes = [base.with_values(values | {"model.modes": count}) for count in modes] or [base.with_values(values)]
     plain = {"model.kind": reference, "model.variant": None, "model.kinematics": scenes[0].model.kinematics}
-    true_scene, plant, error = _reference(base.with_values(plain), scenes[0].model.variant == WITHOUT_STATICS, within)
-    setting = _setting(true_scene, plant, scenes[0].model.variant != WITHOUT_STATICS, depths)
+    has_statics = scenes[0].model.variant != WITHOUT_STATICS
+    true_scene, load, error = _reference(base.with_values(plain), not has_statics, within)
+    setting = _setting(true_scene, load, has_statics, depths)
     held = {"numerics.analysis": true_scene.numerics.analysis, "numerics.output_step": true_scene.numerics.output_step}
     held |= overriding({"numerics.elements": true_scene.numerics.elements}) if true_scene.numerics.mesh is None else {}
     truth, true_plant = _answer(setting, true_scene, None)
@@ -140,26 +141,29 @@ def _refuse_equal(compared: Sequence[ComparedModel]) -> None:
         raise SceneError(f"modes: the model {kind!r} does not change with them (got {len(compared)} numbers; allowed none)")
 
 
-def _reference(scene: Scene, dynamic: bool, within: float) -> tuple[Scene, Plant, float | None]:
-    """Return the reference's scene with its analysis, samples and elements, its plant and the error of its mesh."""
+def _reference(scene: Scene, dynamic: bool, within: float) -> tuple[Scene, StaticLoad, float | None]:
+    """Return the reference's scene with its analysis, samples and elements, the loads at rest and the error of its mesh."""
     if dynamic and scene.numerics.analysis == "auto":
         scene = scene.with_value("numerics.analysis", "dynamic")
     family = model_family(scene.model.kind)
     choice = choose(scene, lambda: family.pilot(scene))
     scene = scene.with_values({"numerics.analysis": choice.analysis, "numerics.output_step": choice.output_step})
     finest = max(REFERENCE_SHARE * min(within, scene.numerics.tolerance), SMALLEST_TOLERANCE)
-    chosen = family.choose(scene.with_value("numerics.tolerance", finest), choice.analysis)
+    load = static_load(family.pilot(scene))
+    chosen = family.choose(load.applied(scene).with_value("numerics.tolerance", finest), choice.analysis)
     elements = chosen.plant.describe().get("elements")
     if elements is not None and scene.numerics.mesh is None:
         scene = scene.with_value("numerics.elements", elements)
-    return scene, build_plant(scene), chosen.error
+    return scene, load, chosen.error
 
 
-def _setting(scene: Scene, plant: Plant, has_statics: bool, depths: Sequence[float] | None) -> _Setting:
-    curve = compared_depths(scene, plant.smallest_depth)
+def _setting(scene: Scene, load: StaticLoad, has_statics: bool, depths: Sequence[float] | None) -> _Setting:
+    least, most = build_plant(scene).smallest_depth, reach(scene)
+    curve = compared_depths(scene, least)
     default = np.linspace(curve[0], curve[-1], DEFAULT_DEPTHS)
+    if scene.insertion.kind == "hold" and curve[0] < scene.insertion.first_depth < curve[-1]:
+        default[1] = scene.insertion.first_depth
     chosen = tuple(float(depth) for depth in (default if depths is None else depths))
-    least, most = plant.smallest_depth, reach(scene)
     if not chosen or len(set(chosen)) < len(chosen) or not all(max(least, 0.0) < depth <= most for depth in chosen):
         shown = ", ".join(f"{depth:g}" for depth in chosen)
         raise SceneError(f"depths: got {shown or 'none'}; allowed different depths above {least:g} to {most:g} m")
@@ -167,7 +171,7 @@ def _setting(scene: Scene, plant: Plant, has_statics: bool, depths: Sequence[flo
     moves = analysis != "static" and not _rests(scene)
     if not moves and not has_statics:
         raise SceneError(f"model.variant: '{WITHOUT_STATICS}' has no equilibrium, and nothing moves in this scene")
-    load = static_load(plant) if has_statics else StaticLoad(0.0, 0.0)
+    load = load if has_statics else StaticLoad(0.0, 0.0)
     return _Setting(scene, analysis, has_statics, load, curve, chosen, moves)
 
 
@@ -213,8 +217,19 @@ def _compared(setting: _Setting, scene: Scene, truth: ModelAnswer, true_plant: P
         None if found is None or exact is None else static_errors(found, exact, scene)
         for found, exact in ((answer.chosen, truth.chosen), (answer.curve, truth.curve))
     )
-    run = None if answer.run is None or truth.run is None else run_errors(answer.run, truth.run)
-    return ComparedModel(answer, chosen, curve, _ranges(setting, true_plant, plant, within), run)
+    ranges = _ranges(setting, true_plant, plant, within)
+    if answer.run is None or truth.run is None:
+        return ComparedModel(answer, chosen, curve, ranges, None, covers=True)
+    run = run_errors(answer.run, truth.run)
+    covers = run.covers(truth.run)
+    if not covers:
+        found = answer.run.run
+        text = (
+            f"{answer.label}: the run ends at {found.time[-1]:.4g} s ({found.summary['stop_reason']}), that of the reference at "
+            f"{truth.run.run.time[-1]:.4g} s: errors are those up to {run.time[-1]:.4g} s"
+        )
+        answer = replace(answer, warnings=(*answer.warnings, text))
+    return ComparedModel(answer, chosen, curve, ranges, run, covers)
 
 
 def _ranges(setting: _Setting, true_plant: Plant, plant: Plant, within: float) -> tuple[Interval, ...]:

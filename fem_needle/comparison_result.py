@@ -64,6 +64,8 @@ class ComparedModel:
         Depths and characteristic numbers at which the tip at rest is within the error.
     run
         Differences over the run; None where nothing moves.
+    covers
+        Whether the run was compared to its end, or nearly; True where there is none.
     """
 
     answer: ModelAnswer
@@ -71,13 +73,14 @@ class ComparedModel:
     curve: StaticErrors | None
     ranges: tuple[Interval, ...]
     run: RunErrors | None
+    covers: bool
 
     @property
     def largest_tip_error(self) -> float:
-        """Largest relative error of the tip (1): over the run, infinite if it failed; without a run at rest over the depths."""
+        """Largest relative error of the tip (1): over the run, infinite if it fails or ends early; without one at rest."""
         if self.run is not None:
             failed = self.answer.run is not None and self.answer.run.failure
-            return float("inf") if failed else self.run.largest_tip
+            return self.run.largest_tip if self.covers and not failed else float("inf")
         return float("inf") if self.curve is None else float(np.max(np.abs(self.curve.tip)))
 
 

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 ENERGIES = ("kinetic_energy", "bending_energy", "tissue_energy")
 SAME_TIME = 1e-9  # of the run
+COVERED = 0.9  # of the reference's time: a run that has less in common with it is no answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,10 @@ class RunErrors:
     def largest_tip(self) -> float:
         """Largest |tip error| (1)."""
         return float(np.max(np.abs(self.tip)))
+
+    def covers(self, reference: TimedRun) -> bool:
+        """Return whether most of the reference's time is compared: a push may end early, a run may fail."""
+        return bool(self.time[-1] >= COVERED * reference.run.time[-1])
 
 
 class _Stopwatch:

@@ -21,6 +21,7 @@ GROUPS = (
     "fem_needle.cli.export",
     "fem_needle.cli.converge",
     "fem_needle.cli.analyze",
+    "fem_needle.cli.compare",
 )
 ENTRY_POINTS = "fem_needle.commands"
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fem_needle.cli.scene_commands import SceneArgument
-from fem_needle.errors import ComputationError, SceneError
+from fem_needle.errors import ComputationError
 
 if TYPE_CHECKING:
     from fem_needle.scene import Scene
@@ -58,7 +58,7 @@ def analyze(
 
     Example: fem-needle analyze brachytherapy --depth 50mm --depth 100mm
     """
-    from fem_needle.cli.settings import changed
+    from fem_needle.cli.settings import changed, number
     from fem_needle.linearization import with_lateral_force
     from fem_needle.run_target import RunTarget
     from fem_needle.scene_file import load_scene
@@ -73,7 +73,7 @@ def analyze(
     }
     loaded = changed(load_scene(scene), assignments or (), options)
     if lateral_position is not None:
-        loaded = with_lateral_force(loaded, _number("--lateral-position", lateral_position, "m"))
+        loaded = with_lateral_force(loaded, number("--lateral-position", lateral_position, "m"))
     wanted = _wanted(depth, time, speed) | {"axial": axial}
     path = RUNS / f"{Path(scene).stem}-{NAME}" if out is None else out
     _analyze(loaded, wanted, StudyFolder(NAME, RunTarget(path, force, numbered=out is None)), quiet=as_json)
@@ -81,28 +81,10 @@ def analyze(
 
 def _wanted(depth: list[str] | None, time: str, speed: str) -> dict[str, Any]:
     """Return depths, time and speed in SI."""
-    depths = None if depth is None else [_number("--depth", text, "m") for text in depth]
-    return {"depths": depths, "time": _number("--time", time, "s"), "speed": _number("--speed", speed, "m/s")}
+    from fem_needle.cli.settings import number
 
-
-def _number(option: str, text: str, unit: str) -> float:
-    """Return a number in SI, or with a unit.
-
-    Raises
-    ------
-    SceneError
-        If it is none.
-    """
-    from fem_needle.scene import units
-
-    try:
-        return float(text)
-    except ValueError:
-        pass
-    try:
-        return units.to_si(text, unit)
-    except ValueError as error:
-        raise SceneError(f"{option}: {error} (got {text!r}; allowed a number of {unit}, or one with a unit)") from None
+    depths = None if depth is None else [number("--depth", text, "m") for text in depth]
+    return {"depths": depths, "time": number("--time", time, "s"), "speed": number("--speed", speed, "m/s")}
 
 
 def _analyze(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet: bool) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fem_needle.errors import SceneError
 from fem_needle.scene.settings import overriding
+from fem_needle.scene.units import to_si
 
 if TYPE_CHECKING:
     from fem_needle.scene import Scene
@@ -43,6 +44,24 @@ def value_of(text: str) -> Any:
     except (ValueError, RecursionError):
         return text.strip()
     return parsed["value"] if len(parsed) == 1 else text
+
+
+def number(option: str, text: str, unit: str) -> float:
+    """Return a number in SI, or with a unit.
+
+    Raises
+    ------
+    SceneError
+        If it is none.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    try:
+        return to_si(text, unit)
+    except ValueError as error:
+        raise SceneError(f"{option}: {error} (got {text!r}; allowed a number of {unit}, or one with a unit)") from None
 
 
 def _assignment(text: str) -> tuple[str, Any]:

@@ -94,6 +94,7 @@ RANKS = {
     "comparison_runs": 15,
     "comparison_result": 16,
     "comparison": 17,
+    "comparison_picture": 17,
     "cli": 20,
     "__main__": 21,
 }
