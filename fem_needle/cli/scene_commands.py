@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from fem_needle.cli.tables import new_table, show
 from fem_needle.errors import SceneError
+
+if TYPE_CHECKING:
+    from fem_needle.scene import Scene
 
 SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help="A scene file, or the name of a shipped scene.")]
 
@@ -65,16 +68,26 @@ def check(
     from fem_needle.scene_file import load_scene
 
     loaded = load_scene(scene)
+    model_warnings = _model_warnings(loaded)
     table = new_table(loaded.title, "Key", "SI", "mm, N, s, degrees")
     for row in scene_rows(loaded):
         table.add_row(*row)
     show(table)
     typer.echo(f"note: {NOT_YOUNGS_MODULUS}")
-    messages = suspicious(loaded)
+    messages = [*suspicious(loaded), *model_warnings]
     for message in messages:
         typer.echo(f"warning: {message}", err=True)
     if messages and strict:
         raise typer.Exit(2)
+
+
+def _model_warnings(scene: Scene) -> tuple[str, ...]:
+    """Refuse what the scene's model cannot have, and return its warnings; finite elements have everything."""
+    if scene.model.kind == "fem":
+        return ()
+    from fem_needle.models import build_plant
+
+    return build_plant(scene).warnings
 
 
 def schema() -> None:

@@ -85,6 +85,18 @@ def test_check_warns_and_is_strict_if_asked(run, tmp_path, options, status):
     assert "warning: tissue.layers.0.foundation_modulus = 5e+06 N/m^2 > 1e6 N/m^2" in err
 
 
+def test_check_refuses_what_the_model_cannot_have(run, tmp_path):
+    path = tmp_path / "mine.toml"
+    text = shipped.template_text()
+    path.write_text(text.replace('kind = "fem"', 'kind = "beads"'))
+    status, _, err = run("check", str(path))
+    assert status == 2
+    assert "model.kind: unknown model (got 'beads'; allowed assumed-modes, fem)" in err
+    path.write_text(text.replace('kind = "fem"\nkinematics = "material"', 'kind = "assumed-modes"\nvariant = "as-printed"'))
+    status, _, err = run("check", str(path))
+    assert status == 2
+
+
 def test_check_takes_markup_in_a_title_as_text(run, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(shipped.template_text().replace('name = "tissue"', 'name = "[/bold] [red]x"'))
