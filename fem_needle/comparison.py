@@ -108,9 +108,10 @@ def compare(
     setting = _setting(true_scene, load, has_statics, depths)
     held = {"numerics.analysis": true_scene.numerics.analysis, "numerics.output_step": true_scene.numerics.output_step}
     held |= overriding({"numerics.elements": true_scene.numerics.elements}) if true_scene.numerics.mesh is None else {}
-    truth, true_plant = _answer(setting, true_scene, None)
-    compared = tuple(_compared(setting, one.with_values(held), truth, true_plant, within) for one in scenes)
-    _refuse_equal(compared)
+    plants = [build_plant(one.with_values(held)) for one in scenes]  # all of them, before anything is computed
+    _refuse_equal(plants)
+    truth, true_plant = _answer(setting, build_plant(true_scene), None)
+    compared = tuple(_compared(setting, plant, truth, true_plant, within) for plant in plants)
     return Comparison(
         scene=scene,
         reference=truth,
@@ -134,11 +135,11 @@ def _check(modes: Sequence[int], within: float) -> None:
         raise SceneError(mistakes)
 
 
-def _refuse_equal(compared: Sequence[ComparedModel]) -> None:
+def _refuse_equal(plants: Sequence[Plant]) -> None:
     """Refuse numbers of modes that a model does not know."""
-    if len(compared) > 1 and "modes" not in compared[0].answer.description:
-        kind = compared[0].answer.description.get("model", compared[0].answer.label)
-        raise SceneError(f"modes: the model {kind!r} does not change with them (got {len(compared)} numbers; allowed none)")
+    if len(plants) > 1 and "modes" not in plants[0].describe():
+        kind = plants[0].scene.model.kind
+        raise SceneError(f"modes: the model {kind!r} does not change with them (got {len(plants)} numbers; allowed none)")
 
 
 def _reference(scene: Scene, dynamic: bool, within: float) -> tuple[Scene, StaticLoad, float | None]:
@@ -181,10 +182,9 @@ def _rests(scene: Scene) -> bool:
     return rests and scene.initial.shape == "equilibrium" and scene.tissue.rest_line == "straight"
 
 
-def _answer(setting: _Setting, scene: Scene, truth: ModelAnswer | None) -> tuple[ModelAnswer, Plant]:
+def _answer(setting: _Setting, plant: Plant, truth: ModelAnswer | None) -> tuple[ModelAnswer, Plant]:
     """Return what a model answers (the reference, where there is no truth yet), and the plant of its equilibria."""
-    plant = build_plant(scene)
-    still = plant if not setting.load.probe_force else build_plant(setting.load.applied(scene))
+    still = plant if not setting.load.probe_force else build_plant(setting.load.applied(plant.scene))
     chosen = curve = run = None
     if setting.has_statics:
         chosen = rest_states(still, setting.depths, setting.load.time)
@@ -194,7 +194,7 @@ def _answer(setting: _Setting, scene: Scene, truth: ModelAnswer | None) -> tuple
     warnings = tuple(run.run.summary["warnings"]) if run is not None else plant.warnings
     description = dict(plant.describe())
     answer = ModelAnswer(
-        label=_label(description, scene.model.kind),
+        label=_label(description, plant.scene.model.kind),
         description=description,
         unknowns=plant.size - plant.prescribed,
         chosen=chosen,
@@ -211,10 +211,10 @@ def _label(description: dict[str, Any], kind: str) -> str:
     return f"{description['modes']} mode{'s' if description['modes'] != 1 else ''}"
 
 
-def _compared(setting: _Setting, scene: Scene, truth: ModelAnswer, true_plant: Plant, within: float) -> ComparedModel:
-    answer, plant = _answer(setting, scene, truth)
+def _compared(setting: _Setting, model: Plant, truth: ModelAnswer, true_plant: Plant, within: float) -> ComparedModel:
+    answer, plant = _answer(setting, model, truth)
     chosen, curve = (
-        None if found is None or exact is None else static_errors(found, exact, scene)
+        None if found is None or exact is None else static_errors(found, exact, setting.scene)
         for found, exact in ((answer.chosen, truth.chosen), (answer.curve, truth.curve))
     )
     ranges = _ranges(setting, true_plant, plant, within)
