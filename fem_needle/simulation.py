@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+import warnings
 from collections.abc import Generator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from fem_needle.choices import Choice, choose, first_time_step
 from fem_needle.collocation import collocation
-from fem_needle.errors import ComputationError
+from fem_needle.errors import ComputationError, SuspiciousValueWarning
 from fem_needle.march import RunEnd, TimeGrid, march, time_grid
 from fem_needle.mesh_file import mesh_positions
 from fem_needle.models import ChosenPlant, model_family
@@ -171,6 +172,8 @@ def simulate(
 
 def _run(job: _Job) -> Trajectory:
     """Run with the given step, or with steps that are halved until two runs agree."""
+    for message in job.plant.warnings:
+        warnings.warn(message, SuspiciousValueWarning, stacklevel=3)
     given, analysis = job.scene.numerics.time_step, job.choice.analysis
     if isinstance(given, float):
         return _run_live(job, given, None)

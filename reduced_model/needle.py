@@ -86,6 +86,7 @@ class AssumedModeNeedle(BeamNeedle):
             shapes = joined(1.0, _sets(scene, 1.0, count))
             frame = StretchedFrame()
             beam = stretched_part(shapes, LineShapes(1.0, shapes.sets, offset=-1.0), frame, scene)
+        _check_guides(scene, shapes.size - 2)
         super().__init__(scene, shapes, frame, beam)
         self.modes = count
         self.corrections = shapes.size - count - 2
@@ -138,6 +139,13 @@ def _with_settings(
     given = {"modes": modes, "variant": variant, "basis": basis, "static_corrections": static_corrections}
     values = {f"model.{key}": value for key, value in given.items() if value is not None}
     return scene.with_values({"model.kind": "assumed-modes"} | values)
+
+
+def _check_guides(scene: Scene, functions: int) -> None:
+    rigid = sum(guide.stiffness == "rigid" for guide in scene.support.guides)
+    if functions <= rigid:
+        message = f"too few to obey {rigid} rigid guides and still move (got {scene.model.modes}; allowed {rigid + 1} or more)"
+        raise SceneError(f"model.modes: {message}")
 
 
 def _sets(scene: Scene, span: float, count: int) -> list[FunctionSet]:

@@ -8,12 +8,13 @@ entry point of the group ``fem_needle.commands``.
 from __future__ import annotations
 
 import sys
+import warnings
 from importlib import import_module, metadata
 from typing import Annotated
 
 import typer
 
-from fem_needle.errors import NeedleError, SceneError
+from fem_needle.errors import NeedleError, SceneError, SuspiciousValueWarning
 
 GROUPS = (
     "fem_needle.cli.scene_commands",
@@ -31,6 +32,7 @@ FAILED = 1
 
 def main() -> None:
     """Run the command line; exit status 0 done, 2 wrong input, 1 failed."""
+    warnings.simplefilter("ignore", SuspiciousValueWarning)  # the commands show them themselves
     try:
         build_application()()
     except SceneError as error:

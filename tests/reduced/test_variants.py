@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fem_needle import FiniteElementNeedle, SceneError, banded, load_scene, run_scene, simulate
+from fem_needle import FiniteElementNeedle, SceneError, SuspiciousValueWarning, banded, load_scene, run_scene, simulate
 from fem_needle.scene import Guide, Initial, LateralLoad, Layer, Model, Needle, Scene, Sinusoid, Support, TipLoad, Tissue
 from reduced_model import AssumedModeNeedle, ClampedFreeModes
 from tests.consistency.scenes import LAYERS, held, moving, scene_of
@@ -97,7 +97,9 @@ def test_the_second_mode_grows_without_bound():
 
 
 def test_running_the_printed_equations_warns_and_breaks_the_energy():
-    run = run_scene(load_scene("thesis-open-loop").with_values({"model.kind": "assumed-modes", "model.variant": "as-printed"}))
+    scene = load_scene("thesis-open-loop").with_values({"model.kind": "assumed-modes", "model.variant": "as-printed"})
+    with pytest.warns(SuspiciousValueWarning, match="second mode|spring at the tip"):
+        run = run_scene(scene)
     assert "second mode has no stiffness" in run.summary["warnings"][0]
     assert any("spring at the tip" in text for text in run.summary["warnings"])
     assert run.summary["relative_energy_residual"] > 0.1
@@ -122,6 +124,13 @@ def test_what_the_printed_equations_cannot_have(values, message):
     scene = scene_of("entry", held(0.1), (Layer(foundation_modulus=520.0),), (), initial=RELEASED, model=PRINTED)
     with pytest.raises(SceneError, match=message):
         AssumedModeNeedle(scene.with_values(values))
+
+
+def test_two_modes_cannot_obey_two_rigid_guides():
+    scene = scene_of("hub", held(0.1), support={"guides": [Guide(position=-0.03), Guide(position=-0.02)]})
+    with pytest.raises(SceneError, match="2 rigid guides"):
+        AssumedModeNeedle(scene)
+    assert AssumedModeNeedle(scene, modes=3).modes == 3
 
 
 FEATURES = {

@@ -129,6 +129,7 @@ def test_a_scene_without_loads_is_bent_by_a_force_at_the_tip(pushed, held):
     assert pushed.models[0].answer.chosen.tips[-1] == pytest.approx(compliance, rel=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore::fem_needle.errors.SuspiciousValueWarning")
 def test_the_printed_equations_are_compared_in_the_run_alone():
     found = compare(load_scene("thesis-open-loop").with_values(PUSHED), variant="as-printed", elements=8)
     (model,) = found.models
