@@ -99,16 +99,14 @@ def compare(
     _check(modes, within)
     given = {"numerics.elements": elements, "numerics.time_step": time_step}
     base = scene.with_values(overriding({path: value for path, value in given.items() if value is not None}))
-    choice = {"variant": variant, "basis": basis, "static_corrections": static_corrections}
-    values = {"model.kind": model} | {f"model.{key}": value for key, value in choice.items() if value is not None}
-    scenes = [base.with_values(values | {"model.modes": count}) for count in modes] or [base.with_values(values)]
-    plain = {"model.kind": reference, "model.variant": None, "model.kinematics": scenes[0].model.kinematics}
-    has_statics = scenes[0].model.variant != WITHOUT_STATICS
+    values = {"kind": model, "variant": variant, "basis": basis, "static_corrections": static_corrections}
+    tested = base.with_values({f"model.{key}": value for key, value in values.items() if value is not None})
+    scenes = [tested.with_value("model.modes", count) for count in modes] or [tested]
+    plain = {"model.kind": reference, "model.variant": None, "model.kinematics": tested.model.kinematics}
+    has_statics = tested.model.variant != WITHOUT_STATICS
     true_scene, load, error = _reference(base.with_values(plain), not has_statics, within)
     setting = _setting(true_scene, load, has_statics, depths)
-    held = {"numerics.analysis": true_scene.numerics.analysis, "numerics.output_step": true_scene.numerics.output_step}
-    held |= overriding({"numerics.elements": true_scene.numerics.elements}) if true_scene.numerics.mesh is None else {}
-    plants = [build_plant(one.with_values(held)) for one in scenes]  # all of them, before anything is computed
+    plants = [build_plant(one.with_values(_held(true_scene))) for one in scenes]  # all of them, before anything is computed
     _refuse_equal(plants)
     truth, true_plant = _answer(setting, build_plant(true_scene), None)
     compared = tuple(_compared(setting, plant, truth, true_plant, within) for plant in plants)
@@ -123,6 +121,13 @@ def compare(
         depths=setting.depths,
         within=within,
     )
+
+
+def _held(scene: Scene) -> dict[str, Any]:
+    """Return what the models take from the reference's scene: analysis, samples, elements."""
+    numerics = scene.numerics
+    found = {"numerics.analysis": numerics.analysis, "numerics.output_step": numerics.output_step}
+    return found | (overriding({"numerics.elements": numerics.elements}) if numerics.mesh is None else {})
 
 
 def _check(modes: Sequence[int], within: float) -> None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from fem_needle.comparison_static import RestStates, StaticErrors
 
 Row = tuple[str, ...]
+EARLY = "ends early"
 _ENERGIES = ("kinetic", "bending", "tissue", "total")
 
 
@@ -119,13 +120,13 @@ def _in_the_run(comparison: Comparison) -> Iterator[Row]:
     yield "in the run:", *("" for _ in known)
     yield "  ends", *(f"{1e3 * run.run.depth[-1]:.4g} mm, {run.run.time[-1]:.4g} s" for run in known)
     yield "  tip at the end [mm]", *(f"{1e3 * run.run.tip_deflection[-1]:.5g}" for run in known)
-    yield _errors(comparison, "  largest tip error", lambda model: _percent(_moving(model).largest_tip))
-    yield _errors(comparison, "  largest shape error", lambda model: _percent(float(_moving(model).shape.max())))
+    yield _errors(comparison, "  largest tip error", lambda model: _run_percent(model, _moving(model).largest_tip))
+    yield _errors(comparison, "  largest shape error", lambda model: _run_percent(model, float(_moving(model).shape.max())))
     if comparison.scene.insertion.kind == "force":
         yield _errors(comparison, "  depth error [mm]", lambda model: f"{1e3 * _moving(model).depth_difference:.2g}")
     for name in _ENERGIES:
-        errors = [_moving(model).energies[f"{name}_energy"] for model in comparison.models]
-        yield f"  {name} energy error", "", *(_percent(error) for error in errors)
+        cells = (_run_percent(model, _moving(model).energies[f"{name}_energy"]) for model in comparison.models)
+        yield f"  {name} energy error", "", *cells
     yield "  energy residual", *(f"{run.run.summary['relative_energy_residual']:.1e}" for run in known)
 
 
@@ -151,6 +152,11 @@ def _errors(comparison: Comparison, name: str, cell: Callable[[ComparedModel], s
 
 def _percent(value: float) -> str:
     return f"{100 * value:.3g} %"
+
+
+def _run_percent(model: ComparedModel, value: float) -> str:
+    """Return an error of the run, or that it ended too early to have one."""
+    return _percent(value) if model.covers else EARLY
 
 
 def _chosen(answer: ModelAnswer) -> RestStates:

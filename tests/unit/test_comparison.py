@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fem_needle import ComputationError, FiniteElementNeedle, SceneError, comparison_runs, load_scene, run_scene, solve_static
+from fem_needle.cli.compare_table import EARLY, _in_the_run
 from fem_needle.comparison import compare
 from fem_needle.comparison_range import described, intervals_within
 from fem_needle.comparison_static import compared_depths, relative_difference
@@ -235,3 +236,4 @@ def test_a_run_that_ends_early_is_infinitely_wrong_and_says_so(monkeypatch):
     (model,) = found.models
     assert model.run.largest_tip < found.largest_tip_error == np.inf
     assert "the run ends at" in model.answer.warnings[-1]
+    assert {cells[2] for cells in _in_the_run(found) if "error" in cells[0] and "depth" not in cells[0]} == {EARLY}
