@@ -104,12 +104,10 @@ def _depths(ranges: tuple[Interval, ...]) -> str:
 
 
 def _numbers(ranges: tuple[Interval, ...]) -> str:
-    several = len({part.layer for part in ranges}) > 1
-    texts = (
-        f"{part.number_start:.3f} to {part.number_end:.3f}{f' ({part.layer})' if several and part.layer else ''}"
-        for part in ranges
-    )
-    return ", ".join(texts) or "nowhere"
+    inside = [part for part in ranges if part.layer]
+    several = len({part.layer for part in inside}) > 1
+    texts = (f"{part.number_start:.3f} to {part.number_end:.3f}{f' ({part.layer})' if several else ''}" for part in inside)
+    return ", ".join(texts) or ("in no layer" if ranges else "nowhere")
 
 
 def _in_the_run(comparison: Comparison) -> Iterator[Row]:

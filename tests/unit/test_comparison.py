@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fem_needle import ComputationError, FiniteElementNeedle, SceneError, comparison_runs, load_scene, run_scene, solve_static
-from fem_needle.cli.compare_table import EARLY, _in_the_run
+from fem_needle.cli.compare_table import EARLY, _depths, _in_the_run, _numbers
 from fem_needle.comparison import compare
-from fem_needle.comparison_range import described, intervals_within
+from fem_needle.comparison_range import Interval, described, intervals_within
 from fem_needle.comparison_static import compared_depths, relative_difference
 from fem_needle.models import build_plant
 
@@ -237,3 +237,16 @@ def test_a_run_that_ends_early_is_infinitely_wrong_and_says_so(monkeypatch):
     assert model.run.largest_tip < found.largest_tip_error == np.inf
     assert "the run ends at" in model.answer.warnings[-1]
     assert {cells[2] for cells in _in_the_run(found) if "error" in cells[0] and "depth" not in cells[0]} == {EARLY}
+
+
+def test_ranges_are_shown_by_layer_and_joined_over_the_depth():
+    parts = (
+        Interval(0.0, 0.01, "", 0.0, 0.0),
+        Interval(0.01, 0.02, "fat", 0.1, 0.2),
+        Interval(0.02, 0.03, "gland", 0.3, 0.4),
+        Interval(0.05, 0.06, "gland", 0.6, 0.7),
+    )
+    assert _depths(parts) == "0.0 to 30.0, 50.0 to 60.0"
+    assert _numbers(parts) == "0.100 to 0.200 (fat), 0.300 to 0.400 (gland), 0.600 to 0.700 (gland)"
+    assert _numbers(parts[2:]) == "0.300 to 0.400, 0.600 to 0.700"
+    assert (_numbers(parts[:1]), _numbers(()), _depths(())) == ("in no layer", "nowhere", "nowhere")
