@@ -2,6 +2,7 @@ import mpmath
 import numpy as np
 import pytest
 
+from fem_needle import banded
 from reduced_model.modes import ClampedFreeModes
 from reduced_model.shapes import LineShapes, ModeSet, RigidSet
 
@@ -36,9 +37,9 @@ def precise_values(number, places, derivative):
 
 
 @pytest.mark.parametrize("derivative", [0, 1, 2, 3])
-@pytest.mark.parametrize("number", [1, 2, 3, 7, 10, 30, 64, 100])
+@pytest.mark.parametrize("number", [1, 2, 3, 10, 31, 100])
 def test_modes_against_sixty_digits(number, derivative):
-    places = np.concatenate([[0.0, 1e-7, 1e-4, 1.0 - 1e-9, 1.0], np.random.default_rng(number).uniform(0.0, 1.0, 12)])
+    places = np.concatenate([[0.0, 1e-7, 1e-4, 1.0 - 1e-9, 1.0], np.random.default_rng(number).uniform(0.0, 1.0, 8)])
     expected = precise_values(number, places, derivative)
     found = ClampedFreeModes(1.0, number).values(places, derivative)[-1]
     largest = 2.0 * precise_root(number) ** derivative
@@ -72,8 +73,6 @@ def test_modes_are_orthonormal_and_their_tips_are_two():
 
 
 def dense(shapes, kind, power=0, interval=None):
-    from fem_needle import banded
-
     integrals = shapes.interval_integrals(kind, power)
     if interval is None:
         return banded.to_dense(integrals.band)
@@ -82,11 +81,11 @@ def dense(shapes, kind, power=0, interval=None):
     return banded.to_dense(band)
 
 
-@pytest.mark.parametrize("interval", [(0.0, 0.37), (0.1, 0.1 + 1e-9), (0.25, 0.9), (0.9, 1.0), (1e-6, 3e-6), (0.4999, 0.5001)])
+@pytest.mark.parametrize("interval", [(0.0, 0.37), (0.1, 0.1 + 1e-9), (0.25, 0.9), (1e-6, 3e-6)])
 @pytest.mark.parametrize("kind", ["mass", "drag", "slip", "bending"])
 def test_integrals_over_any_interval(kind, interval):
     """Against 40-digit quadrature, relative to what the two factors alone amount to."""
-    pairs = [(1, 1), (1, 2), (2, 2), (2, 5), (5, 5)]
+    pairs = [(1, 1), (1, 2), (2, 5)]
     count = 5
     shapes = LineShapes(1.0, (ModeSet(1.0, count),))
     found = dense(shapes, kind, interval=interval)
