@@ -29,7 +29,8 @@ Array = NDArray[np.float64]
 
 MOST_ITERATIONS = 60
 SPEED_TOLERANCE = 1e-15  # of the largest speed of a step
-SPEED_ROUNDING = 1e-12  # of the largest speed: an iteration that no longer approaches below it has met rounding
+SPEED_ROUNDING = 1e-8  # of the largest speed: an iteration that no longer approaches below it has met rounding
+LANDING = 1e-6  # of a level's depth: a located event that misses it by more is none
 LAYER_SIDE = 1e-11  # of the depth: far enough from an interface to be in the layer that the tip moves in
 TIME_RESOLUTION = 1e-9  # of a step: how closely an event's time is found (the state lands on it exactly)
 
@@ -293,7 +294,7 @@ def locate(pusher: Pusher, state: PushState, until: float, direction: int, event
             found = step if high_value == inf else found
         else:
             high, high_value, found = time, value, step or found
-    if found is None:
+    if found is None or (kind == "reaches" and abs(found.state.depth - level) > LANDING * (abs(level) + abs(state.depth))):
         raise FloatingPointError("the insertion speed does not converge")
     if kind != "reaches":
         return replace(found, state=replace(found.state, speed=0.0), event=kind)

@@ -213,6 +213,17 @@ def test_the_open_loop_of_the_thesis():
     assert 0.02 < run.time[-1] < 0.03
 
 
+@pytest.mark.parametrize("modes", [3, 5])
+def test_more_modes_are_pushed_like_the_elements(modes):
+    """Nearly parallel modes leave noise in the push's iteration, which must neither stop nor fling the needle."""
+    scene = load_scene("thesis-open-loop").with_values({"run.duration": 1e-3, "insertion.final_depth": None})
+    settings = {"time_step": 1e-5, "output_step": 2e-4}
+    expected = simulate(FiniteElementNeedle(scene, elements=12), **settings)
+    run = simulate(AssumedModeNeedle(scene, modes=modes), **settings)
+    assert run.depth == pytest.approx(expected.depth, rel=1e-6)
+    assert run.summary["stop_reason"] == "duration"
+
+
 def test_modes_of_the_reference_are_the_textbook_ones():
     assert mode(0.2) == pytest.approx(np.array([2.0, -2.0]) / np.sqrt(0.2), rel=1e-9)
 
