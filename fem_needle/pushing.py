@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 MOST_ITERATIONS = 60
 SPEED_TOLERANCE = 1e-15  # of the largest speed of a step
-SPEED_ROUNDING = 1e-8  # of the largest speed: an iteration that no longer approaches below it has met rounding
+SPEED_ROUNDING = 1e-6  # of the largest speed: an iteration that no longer approaches below it has met rounding
 LANDING = 1e-6  # of a level's depth: a located event that misses it by more is none
 LAYER_SIDE = 1e-11  # of the depth: far enough from an interface to be in the layer that the tip moves in
 TIME_RESOLUTION = 1e-9  # of a step: how closely an event's time is found (the state lands on it exactly)
