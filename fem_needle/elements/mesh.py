@@ -91,8 +91,3 @@ class LineMesh:
         shapes = self.reference.unit_shapes(place, derivative) * self.scales[where].T / size**derivative
         columns = self.reference.stride * where + np.arange(self.reference.count)[:, None]
         return np.asarray(columns, dtype=np.int64), shapes
-
-
-def uniform_mesh(length: float, elements: int, degree: int) -> LineMesh:
-    """Return a mesh of equal elements from 0 to ``length``."""
-    return LineMesh(np.linspace(0.0, length, elements + 1), degree)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fem_needle.elements.mesh import LineMesh, uniform_mesh
+from fem_needle.elements.mesh import LineMesh
 
 UNEVEN = np.array([0.0, 0.1, 0.35, 0.4, 1.0])
 
@@ -30,7 +30,7 @@ def test_a_polynomial_of_the_degree_is_represented_exactly(degree, derivative):
 
 
 def test_several_functions_at_once():
-    mesh = uniform_mesh(1.0, 3, 4)
+    mesh = LineMesh(np.linspace(0.0, 1.0, 4), 4)
     coordinates = np.random.default_rng(1).normal(size=(2, mesh.size))
     together = mesh.evaluate(coordinates, np.array([0.2, 0.9]))
     assert together == pytest.approx(np.array([mesh.evaluate(row, np.array([0.2, 0.9])) for row in coordinates]))
@@ -46,6 +46,6 @@ def test_locate(position, expected):
 
 
 def test_sizes():
-    assert [uniform_mesh(2.0, 5, 3).size, uniform_mesh(2.0, 5, 4).size] == [12, 17]
-    assert [uniform_mesh(2.0, 5, 3).half_bandwidth, uniform_mesh(2.0, 5, 4).half_bandwidth] == [3, 4]
-    assert uniform_mesh(2.0, 5, 4).nodes[-1] == 2.0
+    assert [LineMesh(np.linspace(0.0, 2.0, 6), 3).size, LineMesh(np.linspace(0.0, 2.0, 6), 4).size] == [12, 17]
+    assert [LineMesh(np.linspace(0.0, 2.0, 6), 3).half_bandwidth, LineMesh(np.linspace(0.0, 2.0, 6), 4).half_bandwidth] == [3, 4]
+    assert LineMesh(np.linspace(0.0, 2.0, 6), 4).nodes[-1] == 2.0
