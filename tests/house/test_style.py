@@ -12,7 +12,7 @@ LONGEST_FILE = 400
 SOURCE = python_files(*PACKAGES)
 # Where an import inside a function is right: commands load what they use, a result reaches its folder late.
 LATE_IMPORTS = {("fem_needle.trajectory", "save"), ("fem_needle.trajectory", "load")}
-LATE_PACKAGES = ("fem_needle.cli",)
+LATE_PACKAGES = ("fem_needle.cli", "reduced_model.commands")
 
 
 def by_name(paths):

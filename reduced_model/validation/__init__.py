@@ -1,0 +1,1 @@
+"""Where assumed modes hold and where not, in numbers: the sections of docs/validation.md, each computed anew."""
