@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
+from fem_needle.modal_stepper import needs_no_steps, vibrating_tips
 from fem_needle.motion import PUSH_SLACK, depth_law, run_duration, shortest_period
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import run_limits
@@ -27,6 +28,7 @@ from fem_needle.statics import solve_static
 Array = NDArray[np.float64]
 
 PILOT_INSTANTS = 7
+HISTORY_POINTS = 400
 OUTPUTS = 200
 STEPS_PER_PERIOD = 16
 SHALLOW = 0.02  # of the length: shallower `entry` needles are too stiff to matter
@@ -74,12 +76,22 @@ def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
             skipped = (Skipped("inertia", reason), *skipped)
     elif analysis != "dynamic":
         skipped = (Skipped("inertia", f"analysis = '{analysis}' was asked for"), *skipped)
+    if analysis == "dynamic" and numerics.time_step == "auto" and needs_no_steps(scene):
+        skipped = (*skipped, Skipped("time steps", "held, undamped, under constant loads: eigenvectors once, then cosines"))
     return Choice(analysis, step, skipped, effect if analysis == "quasi-static" else 0.0)
 
 
-def tip_difference(scene: Scene, plant: Plant, finer: Plant) -> float:
-    """Return the largest difference of two plants' static tips over the run, relative to the largest of the finer one's."""
-    return float(np.max(tip_differences(scene, plant, finer)))
+def tip_difference(scene: Scene, plant: Plant, finer: Plant, analysis: str = "static") -> float:
+    """Return the largest difference of two plants' tips over the run, relative to the largest of the finer one's.
+
+    Of static tips; of a vibration that needs no steps, where the analysis is "dynamic", over time.
+    """
+    if analysis != "dynamic" or not needs_no_steps(scene):
+        return float(np.max(tip_differences(scene, plant, finer)))
+    times = np.linspace(0.0, run_duration(scene), HISTORY_POINTS)
+    coarse, fine = vibrating_tips(plant, times), vibrating_tips(finer, times)
+    scale = max(float(np.max(np.abs(fine))), scene.numerics.absolute_tolerance)
+    return float(np.max(np.abs(coarse - fine))) / scale
 
 
 def tip_differences(scene: Scene, plant: Plant, finer: Plant) -> Array:

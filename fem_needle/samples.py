@@ -65,6 +65,7 @@ def sample_step(
 
     Rates of momentum come from the step's own polynomial; its error is of second order in the step.
     """
+    step = step.resolved(at_start=at_start)
     end = step.ends[0] if at_start else step.ends[1]
     instant, solution, scene = end.stage.instant, end.solution, plant.scene
     mass = scene.needle.mass_per_length * scene.needle.length

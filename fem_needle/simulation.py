@@ -17,6 +17,7 @@ from fem_needle.collocation import collocation
 from fem_needle.errors import ComputationError, SuspiciousValueWarning
 from fem_needle.march import RunEnd, TimeGrid, march, time_grid
 from fem_needle.mesh_file import mesh_positions
+from fem_needle.modal_stepper import ModalStepper, needs_no_steps
 from fem_needle.models import ChosenPlant, model_family
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import march_pushed
@@ -177,8 +178,11 @@ def _run(job: _Job) -> Trajectory:
     given, analysis = job.scene.numerics.time_step, job.choice.analysis
     if isinstance(given, float):
         return _run_live(job, given, None)
+    stepper = _stepper(job)
+    if isinstance(stepper, ModalStepper):
+        return _run_live(job, job.choice.output_step, 0.0)
     step = first_time_step(job.plant, analysis, job.choice.output_step)
-    if isinstance(_stepper(job), StaticStepper):
+    if isinstance(stepper, StaticStepper):
         return _run_live(job, step, 0.0)
     return _run_refined(job, step)
 
@@ -244,6 +248,8 @@ def _difference(coarser: Trajectory, finer: Trajectory) -> float:
 
 def _stepper(job: _Job) -> Stepper:
     if job.choice.analysis == "dynamic":
+        if job.scene.numerics.time_step == "auto" and needs_no_steps(job.plant.scene):
+            return ModalStepper(job.plant)
         return DynamicStepper(job.plant, collocation(_spectral_radius(job)))
     if job.choice.analysis == "static":
         return StaticStepper(job.plant)

@@ -48,6 +48,10 @@ class Step(StepParts):
 
     system: StepSystem | None = None
 
+    def resolved(self, *, at_start: bool) -> Step:
+        """Return a step with the same start, or the same end, whose polynomial resolves every rate there."""
+        return self
+
 
 class Stepper(Protocol):
     """Advance a state over one smooth step."""

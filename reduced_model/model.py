@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fem_needle import FiniteElementNeedle
-from fem_needle.choices import instants, tip_differences
+from fem_needle.choices import instants, tip_difference, tip_differences
 from fem_needle.free_response import natural_frequencies
+from fem_needle.modal_stepper import needs_no_steps
 from fem_needle.models import ChosenPlant
 from fem_needle.scene import Scene
 from fem_needle.segments import tip_layer
@@ -23,7 +24,8 @@ class Truncation(NamedTuple):
     Attributes
     ----------
     tip
-        Largest difference of static tips from those of finite elements over the run, by the largest tip.
+        Largest difference of tips from those of finite elements over the run, by the largest tip: of static ones, or over time of
+        a held needle that vibrates.
     frequency
         Largest relative error of the lowest natural frequency.
     depth
@@ -69,6 +71,9 @@ def truncation(plant: AssumedModeNeedle, *, dynamic: bool) -> Truncation:
     reference = FiniteElementNeedle(scene.with_value("numerics.mesh", None), elements=REFERENCE_ELEMENTS)
     places = instants(plant)
     tips = tip_differences(scene, plant, reference)
+    if dynamic and needs_no_steps(scene):
+        found = tip_difference(scene, plant, reference, "dynamic")
+        return Truncation(max(found, float(np.max(tips))), 0.0, places[0][1])
     frequencies = np.zeros(len(places))
     if dynamic:
         for index, (time, depth) in enumerate(places):

@@ -63,6 +63,7 @@ RANKS = {
     "initial": 8,
     "steppers": 8,
     "samples": 9,
+    "modal_stepper": 9,
     "pushing": 10,
     "march": 10,
     "pushed_march": 11,

@@ -1,0 +1,149 @@
+"""A held needle without damping under constant loads: eigenvectors once, then cosines, exact at any time.
+
+    q(t) = q_e + sum_i Phi_i (a_i cos omega_i t + b_i sin omega_i t),   K Phi_i = omega_i^2 M Phi_i,   Phi' M Phi = 1
+
+about the equilibrium q_e under the loads; a and b follow from the state at the start of the run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from fem_needle import banded
+from fem_needle.collocation import Collocation, collocation
+from fem_needle.free_response import frozen_matrices
+from fem_needle.initial import initial_state
+from fem_needle.ledger import StepEnd
+from fem_needle.loads import is_steady, turns_with_needle
+from fem_needle.motion import Motion, depth_law
+from fem_needle.plant import Plant
+from fem_needle.scene import Scene
+from fem_needle.stages import StageSolution, momentum
+from fem_needle.statics import static_state
+from fem_needle.steppers import Step
+
+Array = NDArray[np.float64]
+
+RESOLVED = 1e-2  # of 1 / omega of the highest mode: a step in which every rate is resolved
+
+
+def needs_no_steps(scene: Scene) -> bool:
+    """Return whether eigenvectors and cosines give a dynamic run: a held, undamped, clamped needle under constant loads."""
+    tissue = scene.tissue
+    is_free = tissue.rest_line == "straight" and not any(layer.damping > 0 for layer in tissue.layers)
+    is_held = scene.insertion.kind == "hold" and is_steady(scene)
+    is_clamped = not scene.support.guides and not turns_with_needle(scene)
+    return is_free and is_held and is_clamped and scene.numerics.spectral_radius == 1.0 and scene.model.variant != "as-printed"
+
+
+@dataclass(frozen=True, eq=False)
+class Vibration:
+    """The motion of a plant about its equilibrium.
+
+    Attributes
+    ----------
+    plant
+        The model.
+    origin
+        State at the start of the run.
+    """
+
+    plant: Plant
+    origin: StepEnd
+
+    @cached_property
+    def _rest(self) -> Array:
+        stage = self.origin.stage
+        depth, time = stage.instant.depth, stage.instant.time
+        return static_state(self.plant, stage.operators, stage.points, stage.case, depth=depth, time=time)[0]
+
+    @cached_property
+    def _modes(self) -> tuple[Array, Array, Array, Array]:
+        """Natural frequencies [rad/s], shapes of the free coordinates, amplitudes of cosines and sines."""
+        instant, clamped = self.origin.stage.instant, self.plant.prescribed
+        mass, _, stiffness, basis = frozen_matrices(self.plant, instant.depth, instant.time)
+        # The other way round the lowest frequencies, which matter most, keep all their digits.
+        inverse_squares, vectors = eigh(mass, stiffness)
+        squares = 1 / inverse_squares[::-1]
+        shapes = basis.T @ vectors[:, ::-1] * np.sqrt(squares)
+        weighed = banded.trailing(self.origin.stage.operators.mass, clamped)
+        solution = self.origin.solution
+        away = solution.coordinates - self._rest
+        frequencies = np.sqrt(squares)
+        cosines = shapes.T @ banded.multiply(weighed, away[clamped:])
+        speeds = shapes.T @ banded.multiply(weighed, solution.velocities[clamped:])
+        return frequencies, shapes, cosines, speeds / frequencies
+
+    @property
+    def resolved_time(self) -> float:
+        """A time [s] in which even the fastest vibration hardly moves."""
+        return RESOLVED / float(self._modes[0][-1])
+
+    def at(self, time: float) -> StepEnd:
+        """Return the state at a time [s]."""
+        frequencies, shapes, cosines, sines = self._modes
+        clamped, phases = self.plant.prescribed, frequencies * (time - self.origin.stage.instant.time)
+        coordinates, velocities = self._rest.copy(), np.zeros_like(self._rest)
+        coordinates[clamped:] += shapes @ (cosines * np.cos(phases) + sines * np.sin(phases))
+        velocities[clamped:] = shapes @ (frequencies * (sines * np.cos(phases) - cosines * np.sin(phases)))
+        stage = replace(self.origin.stage, instant=replace(self.origin.stage.instant, time=time))
+        forces = self.origin.solution.forces
+        return StepEnd(stage, StageSolution(coordinates, velocities, momentum(stage, coordinates, velocities), forces))
+
+
+def vibrating_tips(plant: Plant, times: Array) -> Array:
+    """Return the tip deflections [m] at times [s] of a scene that `needs_no_steps`."""
+    vibration = Vibration(plant, initial_state(plant, depth_law(plant.scene)))
+    states = [vibration.at(time) for time in times.tolist()]
+    return np.array([state.stage.points.rows[-1] @ state.solution.coordinates for state in states])
+
+
+@dataclass(frozen=True, eq=False)
+class ModalStep(Step):
+    """A step of any length; its rates are taken on a short one at its end or at its start."""
+
+    vibration: Vibration = field(kw_only=True)
+
+    def resolved(self, *, at_start: bool) -> Step:
+        """Return the short step with the same start, or the same end."""
+        edge = self.ends[0 if at_start else 1].stage.instant.time
+        start = edge if at_start else edge - self.vibration.resolved_time
+        return _between(self.vibration, self.method, self.vibration.at(start), start + self.vibration.resolved_time)
+
+
+@dataclass(frozen=True, eq=False)
+class ModalStepper:
+    """Goes from one output to the next without steps between."""
+
+    plant: Plant
+    inertia: bool = True
+    method: Collocation = field(default_factory=lambda: collocation(1.0))
+
+    def start(self, law: Motion, time: float, until: float, before: StepEnd) -> StepEnd:
+        """Return the state: nothing jumps while the needle is held."""
+        return before
+
+    def advance(self, law: Motion, start: StepEnd, until: float, last: Step | None) -> Step:
+        """Return the step to a time."""
+        known = last.vibration if isinstance(last, ModalStep) else None
+        return _between(known or Vibration(self.plant, start), self.method, start, until)
+
+
+def _between(vibration: Vibration, method: Collocation, start: StepEnd, until: float) -> ModalStep:
+    time = start.stage.instant.time
+    length = until - time
+    nodes = [vibration.at(time + node * length) for node in method.nodes]
+    return ModalStep(
+        vibration.plant,
+        method,
+        length,
+        (start, vibration.at(until)),
+        tuple(node.stage for node in nodes),
+        tuple(node.solution for node in nodes),
+        vibration=vibration,
+    )
