@@ -24,7 +24,7 @@ from reduced_model.validation.cases import (
     resting,
     tip_spring,
 )
-from reduced_model.validation.section import blocks, percent, prose, table
+from reduced_model.validation.section import Section, blocks, percent, prose, table
 from tests.house.source import ROOT
 
 PAGE = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
@@ -122,7 +122,7 @@ def test_the_command_writes_page_and_pictures(tmp_path, monkeypatch):
 
 
 def test_a_page_that_cannot_be_written(tmp_path, monkeypatch):
-    monkeypatch.setattr(page, "AT_REST", {"thesis": thesis_at_rest.section})
+    monkeypatch.setattr(page, "AT_REST", {"thesis": lambda: Section("1", "text")})
     (tmp_path / "file").write_text("in the way")
     done = CliRunner().invoke(build_application(), ["validate", "--quick", "--out", str(tmp_path / "file" / "page.md")])
     assert "cannot be written" in str(done.exception)
