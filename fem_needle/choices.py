@@ -11,18 +11,13 @@ from numpy.typing import NDArray
 
 from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
+from fem_needle.inertia_effect import POINTS_PER_PERIOD, inertia_effect
 from fem_needle.modal_stepper import needs_no_steps, vibrating_tips
 from fem_needle.motion import PUSH_SLACK, depth_law, run_duration, shortest_period
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import run_limits
 from fem_needle.scene import Scene
-from fem_needle.skipping import (
-    INERTIA_SHARE,
-    POINTS_PER_PERIOD,
-    Skipped,
-    inertia_effect,
-    unneeded_terms,
-)
+from fem_needle.skipping import INERTIA_SHARE, Skipped, unneeded_terms
 from fem_needle.statics import solve_static
 
 Array = NDArray[np.float64]

@@ -40,18 +40,24 @@ def natural_frequencies(plant: Plant, depth: float, time: float = 0.0) -> Array:
     return np.sqrt(np.maximum(eigh(stiffness, mass, eigvals_only=True), 0.0))
 
 
-def ringing(plant: Plant, depth: float, time: float, velocity: Array) -> float:
-    """Return the largest |tip deflection| [m] after the needle at rest is given velocities q', over two periods."""
+def ringing(plant: Plant, depth: float, time: float, momentum: Array) -> float:
+    """Return the largest |tip deflection| [m] after the needle at rest is given a momentum M q'.
+
+    Without damping all vibrations are in phase one day: the sum of their amplitudes. With it, the largest over two periods.
+    """
     mass, damping, stiffness, basis = frozen_matrices(plant, depth, time)
-    momentum = basis @ banded.multiply(plant.operators(depth, time).mass, velocity)[plant.prescribed :]
+    struck = basis @ momentum[plant.prescribed :]
     factor, size = cho_factor(mass), len(mass)
     system = np.zeros((2 * size, 2 * size))
     system[:size, size:] = np.eye(size)
     system[size:, :size], system[size:, size:] = -cho_solve(factor, stiffness), -cho_solve(factor, damping)
     rates, shapes = np.linalg.eig(system)
-    amplitudes = np.linalg.solve(shapes, np.concatenate([np.zeros(size), cho_solve(factor, momentum)]).astype(complex))
+    amplitudes = np.linalg.solve(shapes, np.concatenate([np.zeros(size), cho_solve(factor, struck)]).astype(complex))
+    tip = basis @ plant.points(depth).rows[-1, plant.prescribed :]
+    answers = tip @ shapes[:size] * amplitudes
+    if not np.any(damping):
+        return float(np.sum(np.abs(answers)))
     lowest = float(np.sqrt(eigh(stiffness, mass, eigvals_only=True, subset_by_index=[0, 0])[0]))
     times = np.geomspace(1e-4, 1.0, RESPONSE_POINTS) * (4 * np.pi / lowest)
-    tip = basis @ plant.points(depth).rows[-1, plant.prescribed :]
-    response = (tip @ shapes[:size] * amplitudes) @ np.exp(np.outer(rates, times))
+    response = answers @ np.exp(np.outer(rates, times))
     return float(np.max(np.abs(response.real)))

@@ -10,8 +10,8 @@ import numpy as np
 
 from fem_needle import FiniteElementNeedle
 from fem_needle.comparison_runs import RunErrors, run_errors, timed_run
+from fem_needle.inertia_effect import inertia_effect
 from fem_needle.scene import Scene
-from fem_needle.skipping import inertia_effect
 from reduced_model.validation.cases import (
     CORRECTED,
     FIVE,

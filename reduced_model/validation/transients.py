@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from fem_needle import FiniteElementNeedle, simulate
 from fem_needle.free_response import natural_frequencies
+from fem_needle.inertia_effect import inertia_effect
 from fem_needle.scene import Insertion, Run, Scene, Table, TipLoad
-from fem_needle.skipping import inertia_effect
 from reduced_model.validation.cases import TUBE, foundation, inserted, scene_of
 from reduced_model.validation.pictures import Curve, Panel, error_picture
 from reduced_model.validation.section import Section, blocks, kilo, percent, picture, prose, table
@@ -52,7 +52,7 @@ class Effect:
     all_transients
         The same against equilibria, without the viscosity.
     bound
-        `fem_needle.skipping.inertia_effect` of the scene.
+        `fem_needle.inertia_effect.inertia_effect` of the scene.
     """
 
     inertia: float
