@@ -2,7 +2,7 @@
 
 States there: length outside d (here the depth), base rotation theta, amplitudes q1 and q2, and their rates; inputs: insertion
 force and base torque; output: the tip's deflection. Each statement is asked of the linear model at a straight needle, the
-operating point of 3.2.5, and at one that a tip force has bent, by the means of `fem_needle.controllability`.
+operating point of 3.2.5, and at one that a tip force has bent, by the means of `fem_needle.analysis.controllability`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.controllability import (
+from fem_needle.analysis.controllability import (
     Balanced,
     Subspace,
     balance,
@@ -23,8 +23,8 @@ from fem_needle.controllability import (
     observable_subspace,
     output_controllability,
 )
-from fem_needle.linear_model import LinearModel
-from fem_needle.linearization import linearize, with_lateral_force
+from fem_needle.linear.linearization import linearize, with_lateral_force
+from fem_needle.linear.model import LinearModel
 from fem_needle.models import build_plant
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene

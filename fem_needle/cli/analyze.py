@@ -59,7 +59,7 @@ def analyze(
     Example: fem-needle analyze brachytherapy --depth 50mm --depth 100mm
     """
     from fem_needle.cli.settings import changed, number
-    from fem_needle.linearization import with_lateral_force
+    from fem_needle.linear.linearization import with_lateral_force
     from fem_needle.run_target import RunTarget
     from fem_needle.scene_file import load_scene
     from fem_needle.study_files import StudyFolder
@@ -89,9 +89,9 @@ def _wanted(depth: list[str] | None, time: str, speed: str) -> dict[str, Any]:
 
 def _analyze(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet: bool) -> None:
     """Compute, write and show an analysis."""
-    from fem_needle.analysis import analyze as compute
-    from fem_needle.analysis_matlab import analysis_matlab
-    from fem_needle.analysis_picture import analysis_picture
+    from fem_needle.analysis.matlab import analysis_matlab
+    from fem_needle.analysis.picture import analysis_picture
+    from fem_needle.analysis.study import analyze as compute
     from fem_needle.atomic_file import json_bytes, write_atomically
     from fem_needle.cli.analyze_table import show_analysis
 

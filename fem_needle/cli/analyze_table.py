@@ -11,7 +11,7 @@ import typer
 from fem_needle.cli.tables import new_table, show
 
 if TYPE_CHECKING:
-    from fem_needle.analysis import Analysis, DepthAnalysis, Verdict
+    from fem_needle.analysis.study import Analysis, DepthAnalysis, Verdict
 
 MILLIMETERS = 1e3
 FREQUENCIES = 2  # shown of each depth

@@ -11,7 +11,7 @@ from fem_needle.cli.scene_commands import SceneArgument
 from fem_needle.errors import ComputationError
 
 if TYPE_CHECKING:
-    from fem_needle.comparison_result import Comparison
+    from fem_needle.comparison.result import Comparison
     from fem_needle.scene import Scene
     from fem_needle.study_files import StudyFolder
 
@@ -93,8 +93,8 @@ def _compare(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet
     from fem_needle.atomic_file import json_bytes
     from fem_needle.checks import suspicious
     from fem_needle.cli.compare_table import show_comparison
-    from fem_needle.comparison import compare as compute
-    from fem_needle.comparison_picture import comparison_picture
+    from fem_needle.comparison.picture import comparison_picture
+    from fem_needle.comparison.study import compare as compute
 
     folder.check()
     messages = suspicious(scene)

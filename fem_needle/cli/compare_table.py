@@ -13,10 +13,10 @@ from fem_needle.cli.run_table import model_text
 from fem_needle.cli.tables import new_table, show
 
 if TYPE_CHECKING:
-    from fem_needle.comparison_range import Interval
-    from fem_needle.comparison_result import ComparedModel, Comparison, ModelAnswer
-    from fem_needle.comparison_runs import RunErrors
-    from fem_needle.comparison_static import RestStates, StaticErrors
+    from fem_needle.comparison.at_rest import RestStates, StaticErrors
+    from fem_needle.comparison.ranges import Interval
+    from fem_needle.comparison.result import ComparedModel, Comparison, ModelAnswer
+    from fem_needle.comparison.runs import RunErrors
 
 Row = tuple[str, ...]
 EARLY = "ends early"

@@ -11,7 +11,7 @@ from fem_needle.cli.scene_commands import SceneArgument
 from fem_needle.errors import ComputationError, SceneError
 
 if TYPE_CHECKING:
-    from fem_needle.convergence import ConvergenceStudy
+    from fem_needle.convergence.study import ConvergenceStudy
     from fem_needle.scene import Scene
     from fem_needle.study_files import StudyFolder
 
@@ -77,8 +77,8 @@ def _study(scene: Scene, over: str, values: str | None, folder: StudyFolder, *, 
     from fem_needle.atomic_file import json_bytes
     from fem_needle.checks import suspicious
     from fem_needle.cli.converge_table import show_study
-    from fem_needle.convergence import converge as compute
-    from fem_needle.convergence_picture import convergence_picture
+    from fem_needle.convergence.picture import convergence_picture
+    from fem_needle.convergence.study import converge as compute
 
     folder.check()
     for message in suspicious(scene):

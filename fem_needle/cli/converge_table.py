@@ -10,8 +10,8 @@ import typer
 from fem_needle.cli.tables import new_table, show
 
 if TYPE_CHECKING:
-    from fem_needle.convergence import ConvergenceStudy
-    from fem_needle.convergence_rows import ConvergenceRow
+    from fem_needle.convergence.rows import ConvergenceRow
+    from fem_needle.convergence.study import ConvergenceStudy
 
 COLUMNS = (
     "tip [mm]",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem_needle import FiniteElementNeedle
-from fem_needle.comparison_runs import RunErrors, run_errors, timed_run
+from fem_needle.comparison.runs import RunErrors, run_errors, timed_run
 from fem_needle.inertia_effect import inertia_effect
 from fem_needle.scene import Scene
 from reduced_model.validation.cases import (

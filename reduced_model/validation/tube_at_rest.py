@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.comparison_range import Interval, described, intervals_within
-from fem_needle.comparison_static import relative_difference
+from fem_needle.comparison.at_rest import relative_difference
+from fem_needle.comparison.ranges import Interval, described, intervals_within
 from fem_needle.exact.krylov import characteristic_number
 from fem_needle.scene import Scene
 from fem_needle.statics import solve_static

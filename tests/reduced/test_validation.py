@@ -7,8 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from fem_needle import FiniteElementNeedle
+from fem_needle.analysis.depth_gains import depth_gains
 from fem_needle.cli import build_application
-from fem_needle.depth_gains import depth_gains
 from fem_needle.exact import exact_static
 from fem_needle.statics import solve_static
 from reduced_model.validation import page, signs, thesis_at_rest, transients, tube_at_rest

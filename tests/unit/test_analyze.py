@@ -10,11 +10,11 @@ from scipy.io import loadmat
 from scipy.optimize import brentq
 
 from fem_needle import FiniteElementNeedle, SceneError, analyze, cli, load_scene, solve_static
-from fem_needle.analysis import scene_depths
-from fem_needle.analysis_matlab import analysis_matlab
-from fem_needle.depth_gains import depth_gains, tip_gains
+from fem_needle.analysis.depth_gains import depth_gains, tip_gains
+from fem_needle.analysis.matlab import analysis_matlab
+from fem_needle.analysis.study import scene_depths
 from fem_needle.exact import exact_static
-from fem_needle.linearization import linearize
+from fem_needle.linear.linearization import linearize
 from fem_needle.scene import Guide, LateralLoad, Layer, Needle, Table, TipLoad
 from tests.consistency.scenes import GEL, held, moving, profile, scene_of
 
@@ -25,7 +25,7 @@ KEYS = {"lateral_force": "loads.0.force", "tip_force": "loads.1.force", "hub_def
 @pytest.fixture(autouse=True)
 def few_points(monkeypatch):
     """Curves of 31 points: enough for every sign change here but the last one at the skin."""
-    monkeypatch.setattr("fem_needle.depth_gains.POINTS", 31)
+    monkeypatch.setattr("fem_needle.analysis.depth_gains.POINTS", 31)
 
 
 def pushed_at_the_skin(modulus):

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fem_needle import ComputationError, FiniteElementNeedle, SceneError, comparison_runs, load_scene, run_scene, solve_static
+from fem_needle import ComputationError, FiniteElementNeedle, SceneError, load_scene, run_scene, solve_static
 from fem_needle.cli.compare_table import EARLY, _depths, _in_the_run, _numbers
-from fem_needle.comparison import compare
-from fem_needle.comparison_range import Interval, described, intervals_within
-from fem_needle.comparison_static import compared_depths, relative_difference
+from fem_needle.comparison import runs
+from fem_needle.comparison.at_rest import compared_depths, relative_difference
+from fem_needle.comparison.ranges import Interval, described, intervals_within
+from fem_needle.comparison.study import compare
 from fem_needle.models import build_plant
 
 SHORT = {"insertion.final_depth": 0.06, "numerics.output_step": 1.0}
@@ -141,7 +142,7 @@ def test_the_printed_equations_are_compared_in_the_run_alone():
 
 
 def test_a_run_that_fails_is_infinitely_wrong(monkeypatch):
-    real, calls = comparison_runs.simulate, []
+    real, calls = runs.simulate, []
 
     def failing(plant, **settings):
         run = real(plant, **settings)
@@ -152,7 +153,7 @@ def test_a_run_that_fails_is_infinitely_wrong(monkeypatch):
         error.partial = run
         raise error
 
-    monkeypatch.setattr(comparison_runs, "simulate", failing)
+    monkeypatch.setattr(runs, "simulate", failing)
     found = compare(load_scene("thesis").with_values(SHORT), elements=4)
     assert found.models[0].largest_tip_error == np.inf
     assert found.models[0].answer.warnings[-1] == "the second run fails"
@@ -225,13 +226,13 @@ def test_differences_by_zero_are_infinite_or_none():
 
 def test_a_run_that_ends_early_is_infinitely_wrong_and_says_so(monkeypatch):
     """A model that a push drives too fast agrees with the reference for as long as both go on: that is no agreement."""
-    real, calls = comparison_runs.simulate, []
+    real, calls = runs.simulate, []
 
     def hasty(plant, **settings):
         calls.append(plant)
         return real(plant if len(calls) < 2 else build_plant(plant.scene.with_value("insertion.push_force", 30.0)), **settings)
 
-    monkeypatch.setattr(comparison_runs, "simulate", hasty)
+    monkeypatch.setattr(runs, "simulate", hasty)
     found = compare(load_scene("thesis-open-loop").with_values(PUSHED), elements=8)
     (model,) = found.models
     assert model.run.largest_tip < found.largest_tip_error == np.inf

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fem_needle import FiniteElementNeedle, SceneError
-from fem_needle.controllability import (
+from fem_needle.analysis.controllability import (
     balance,
     controllable_modes,
     controllable_subspace,
@@ -14,8 +14,8 @@ from fem_needle.controllability import (
     output_controllability,
 )
 from fem_needle.errors import ComputationError
-from fem_needle.linearization import linearize
-from fem_needle.modal_form import modal
+from fem_needle.linear.linearization import linearize
+from fem_needle.linear.modal_form import modal
 from fem_needle.scene import Guide, LateralLoad, TipLoad
 from tests.consistency.scenes import DAMPED, GEL, held, scene_of
 

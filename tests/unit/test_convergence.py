@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from fem_needle import ConvergenceStudy, FiniteElementNeedle, SceneError, converge, load_scene, simulate
-from fem_needle.convergence_rows import RowMaker, best_reference, gathered
-from fem_needle.exact_reference import ExactReference
+from fem_needle.convergence.exact_reference import ExactReference
+from fem_needle.convergence.refinement import Level
+from fem_needle.convergence.rows import RowMaker, best_reference, gathered
 from fem_needle.models import ChosenPlant
-from fem_needle.refinement import Level
 from fem_needle.study_files import csv_bytes
 
 TIMES = np.linspace(0.0, 1.0, 5)
@@ -180,7 +180,7 @@ def test_an_interrupted_run_is_no_row(monkeypatch):
         interrupted.append(run)
         return run
 
-    monkeypatch.setattr("fem_needle.refinement.simulate", interrupt)
+    monkeypatch.setattr("fem_needle.convergence.refinement.simulate", interrupt)
     with pytest.raises(KeyboardInterrupt):
         converge(scene, values=(1, 2), time_step=1e-4)
     assert len(interrupted) == 1
@@ -201,7 +201,7 @@ class CountedInModes:
 
 def test_another_model_is_studied_over_its_modes_without_code_that_knows_it(monkeypatch):
     over_elements = converge(BENCH, "elements", (2, 4, 8))
-    monkeypatch.setattr("fem_needle.refinement.model_family", lambda kind: CountedInModes())
+    monkeypatch.setattr("fem_needle.convergence.refinement.model_family", lambda kind: CountedInModes())
     over_modes = converge(BENCH, "modes", (2, 4, 8), model="counted")
     assert [row.error for row in over_modes.rows] == [row.error for row in over_elements.rows]
     assert over_modes.theoretical_order is None

@@ -5,15 +5,15 @@ import pytest
 from scipy.linalg import eigh
 
 from fem_needle import FiniteElementNeedle, SceneError, banded, load_scene, solve_static
-from fem_needle.depth_rates import kinetic_matrix_rates, numerical_rate, smooth_range
 from fem_needle.errors import ComputationError, NeedleError
 from fem_needle.exact import natural_frequencies
 from fem_needle.ledger import axial_momentum, configuration_force
-from fem_needle.linearization import linearize, with_lateral_force
+from fem_needle.linear.depth_rates import kinetic_matrix_rates, numerical_rate, smooth_range
+from fem_needle.linear.linearization import linearize, with_lateral_force
+from fem_needle.linear.small_motion import operating_point
 from fem_needle.loads import LoadCase, load_case
 from fem_needle.motion import Instant
 from fem_needle.scene import Friction, Guide, LateralLoad, Layer, Model, TipLoad
-from fem_needle.small_motion import operating_point
 from fem_needle.stages import StageSolution, evaluate_stage, internal_force, momentum
 from reduced_model import AssumedModeNeedle
 from tests.consistency.scenes import GEL, LENGTH, held, relative, scene_of
@@ -356,7 +356,7 @@ def test_python_control(monkeypatch):
     column = system.input_labels.index("tip_force")
     found = system(200j)[0, column]
     assert found == pytest.approx(complex(model.transfer_function("tip_deflection", "tip_force", 200.0)), rel=1e-6)
-    monkeypatch.setattr("fem_needle.linear_model.import_module", _missing)
+    monkeypatch.setattr("fem_needle.linear.model.import_module", _missing)
     with pytest.raises(NeedleError, match=r"fem-needle\[control\]"):
         model.to_control()
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fem_needle.richardson import correction_factor, grid_convergence_index, order_from_differences, order_from_errors
+from fem_needle.convergence.richardson import correction_factor, grid_convergence_index, order_from_differences, order_from_errors
 
 LIMIT, CONSTANT = 1.7, 0.3
 RATIOS = [(2.0, 2.0), (1.5, 2.0), (2.0, 1.3), (1.1, 3.0), (4.0, 1.05)]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.io import savemat
 
-from fem_needle.analysis import Analysis
-from fem_needle.linear_model import LinearModel, Signal
+from fem_needle.analysis.study import Analysis
+from fem_needle.linear.model import LinearModel, Signal
 
 
 def analysis_matlab(analysis: Analysis) -> bytes:

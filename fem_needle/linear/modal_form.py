@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from fem_needle.errors import ComputationError, SceneError
-from fem_needle.linear_model import LinearModel, SecondOrder, Signal
+from fem_needle.linear.model import LinearModel, SecondOrder, Signal
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.comparison_static import shape_stations
+from fem_needle.comparison.at_rest import shape_stations
 from fem_needle.errors import ComputationError
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample

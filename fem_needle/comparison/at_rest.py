@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fem_needle.choices import SHALLOW, instants, static_tips
 from fem_needle.free_response import natural_frequencies
 from fem_needle.gauss import gauss_rule
-from fem_needle.linearization import reach
+from fem_needle.linear.linearization import reach
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene
 from fem_needle.statics import Equilibrium, solve_static

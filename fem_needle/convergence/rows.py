@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.exact_reference import ExactReference
-from fem_needle.refinement import Level
-from fem_needle.richardson import correction_factor, grid_convergence_index, order_from_differences, order_from_errors
+from fem_needle.convergence.exact_reference import ExactReference
+from fem_needle.convergence.refinement import Level
+from fem_needle.convergence.richardson import correction_factor, grid_convergence_index, order_from_differences, order_from_errors
 
 Array = NDArray[np.float64]
 

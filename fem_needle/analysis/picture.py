@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from fem_needle.analysis import Analysis
-from fem_needle.depth_gains import DepthGains
+from fem_needle.analysis.depth_gains import DepthGains
+from fem_needle.analysis.study import Analysis
 from fem_needle.pictures import COLORS, INK, MARKERS, WIDTH, new_figure, png_bytes, shared_style
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.controllability import (
+from fem_needle.analysis.controllability import (
     Balanced,
     PencilTest,
     balance,
@@ -19,11 +19,11 @@ from fem_needle.controllability import (
     observable_subspace,
     output_controllability,
 )
-from fem_needle.depth_gains import DepthGains, depth_gains
+from fem_needle.analysis.depth_gains import DepthGains, depth_gains
 from fem_needle.errors import SceneError
-from fem_needle.linear_model import LinearModel
-from fem_needle.linearization import Axial, linearize, reach
-from fem_needle.modal_form import AXIAL, modal
+from fem_needle.linear.linearization import Axial, linearize, reach
+from fem_needle.linear.modal_form import AXIAL, modal
+from fem_needle.linear.model import LinearModel
 from fem_needle.models import build_plant
 from fem_needle.motion import depth_law, run_duration
 from fem_needle.plant import Plant

@@ -6,13 +6,22 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
-from fem_needle.convergence_rows import ConvergenceRow, RowMaker, best_reference, gathered
+from fem_needle.convergence.exact_reference import exact_reference
+from fem_needle.convergence.refinement import (
+    PATHS,
+    Level,
+    Setting,
+    coarsest_time_step,
+    finer_otherwise,
+    levels_of,
+    setting_of,
+    size_of,
+)
+from fem_needle.convergence.rows import ConvergenceRow, RowMaker, best_reference, gathered
+from fem_needle.convergence.theoretical_order import theoretical_order
 from fem_needle.errors import SceneError
-from fem_needle.exact_reference import exact_reference
-from fem_needle.refinement import PATHS, Level, Setting, coarsest_time_step, finer_otherwise, levels_of, setting_of, size_of
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
-from fem_needle.theoretical_order import theoretical_order
 
 DEFAULT_VALUES = {"elements": (4, 8, 16, 32), "modes": (1, 2, 4, 8)}
 DEFAULT_HALVINGS = 4

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.comparison_range import Interval
-from fem_needle.comparison_runs import ENERGIES, RunErrors, TimedRun, shape_at
-from fem_needle.comparison_static import FREQUENCIES, RestStates, StaticErrors, StaticLoad
+from fem_needle.comparison.at_rest import FREQUENCIES, RestStates, StaticErrors, StaticLoad
+from fem_needle.comparison.ranges import Interval
+from fem_needle.comparison.runs import ENERGIES, RunErrors, TimedRun, shape_at
 from fem_needle.scene import Scene
 
 Array = NDArray[np.float64]

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from fem_needle.convergence import ConvergenceStudy
-from fem_needle.convergence_rows import ROUND_OFF, ConvergenceRow
+from fem_needle.convergence.rows import ROUND_OFF, ConvergenceRow
+from fem_needle.convergence.study import ConvergenceStudy
 from fem_needle.pictures import COLORS, INK, MARKERS, new_figure, png_bytes, shared_style
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from fem_needle.small_motion import SmallMotion
+from fem_needle.linear.small_motion import SmallMotion
 
 Array = NDArray[np.float64]
 

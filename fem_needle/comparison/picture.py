@@ -11,8 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
-from fem_needle.comparison_result import Comparison
-from fem_needle.comparison_runs import ENERGIES
+from fem_needle.comparison.result import Comparison
+from fem_needle.comparison.runs import ENERGIES
 from fem_needle.pictures import COLORS, INK, MARKERS, new_figure, png_bytes, shared_style
 
 Array = NDArray[np.float64]

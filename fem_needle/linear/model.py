@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fem_needle.errors import ComputationError, NeedleError, SceneError
-from fem_needle.small_motion import OperatingPoint
+from fem_needle.linear.small_motion import OperatingPoint
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

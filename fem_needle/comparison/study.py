@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.choices import choose
-from fem_needle.comparison_range import Interval, described, intervals_within
-from fem_needle.comparison_result import ComparedModel, Comparison, ModelAnswer
-from fem_needle.comparison_runs import TimedRun, run_errors, timed_run
-from fem_needle.comparison_static import StaticLoad, compared_depths, rest_states, static_errors, static_load
+from fem_needle.comparison.at_rest import StaticLoad, compared_depths, rest_states, static_errors, static_load
+from fem_needle.comparison.ranges import Interval, described, intervals_within
+from fem_needle.comparison.result import ComparedModel, Comparison, ModelAnswer
+from fem_needle.comparison.runs import TimedRun, run_errors, timed_run
 from fem_needle.errors import SceneError
-from fem_needle.linearization import reach
+from fem_needle.linear.linearization import reach
 from fem_needle.loads import is_steady
 from fem_needle.models import build_plant, model_family
 from fem_needle.plant import Plant

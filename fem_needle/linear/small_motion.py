@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import axial, banded
-from fem_needle.depth_rates import kinetic_matrix_rates, numerical_rate
+from fem_needle.linear.depth_rates import kinetic_matrix_rates, numerical_rate
 from fem_needle.plant import Operators, Plant, Points
 from fem_needle.statics import depth_derivative, solve_static
 

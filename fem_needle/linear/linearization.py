@@ -11,14 +11,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.depth_rates import numerical_rate
 from fem_needle.errors import SceneError
-from fem_needle.guided_motion import Coordinates, Guided, guided, independent_coordinates
-from fem_needle.linear_model import LinearModel, SecondOrder, Signal
+from fem_needle.linear.depth_rates import numerical_rate
+from fem_needle.linear.guided_motion import Coordinates, Guided, guided, independent_coordinates
+from fem_needle.linear.model import LinearModel, SecondOrder, Signal
+from fem_needle.linear.small_motion import OperatingPoint, SmallMotion, operating_point, small_motion
 from fem_needle.loads import turns_with_needle
 from fem_needle.plant import Plant
 from fem_needle.scene import LateralLoad, Scene
-from fem_needle.small_motion import OperatingPoint, SmallMotion, operating_point, small_motion
 
 Array = NDArray[np.float64]
 Axial = Literal["free", "held"]

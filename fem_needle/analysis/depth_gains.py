@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from fem_needle.errors import ComputationError, SceneError
-from fem_needle.linear_model import Signal
-from fem_needle.linearization import lateral_inputs, linearize, reach
+from fem_needle.linear.linearization import lateral_inputs, linearize, reach
+from fem_needle.linear.modal_form import lateral_frequencies
+from fem_needle.linear.model import Signal
 from fem_needle.loads import LoadCase
-from fem_needle.modal_form import lateral_frequencies
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene
 from fem_needle.statics import depth_derivative, solve_static, static_state

@@ -1,0 +1,1 @@
+"""What a needle is to a controller: frequencies, gains, controllability."""

@@ -1,0 +1,1 @@
+"""Convergence studies: errors, orders, extrapolation, pictures."""

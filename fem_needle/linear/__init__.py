@@ -1,0 +1,1 @@
+"""Linear models of a needle about an operating point."""
