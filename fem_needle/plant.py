@@ -149,7 +149,7 @@ class Plant(Protocol):
     size
         Number of coordinates.
     prescribed
-        How many leading coordinates are prescribed (the clamped end), 0 or 2.
+        How many leading coordinates are prescribed: 2 of a clamped end, 1 of a hub that turns, 0 without a clamp.
     deflection_at_one
         Coordinates of the function 1: their product with a force vector is the total force.
     smallest_depth

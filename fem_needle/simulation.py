@@ -25,7 +25,7 @@ from fem_needle.samples import Sample
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
 from fem_needle.skipping import inertia_free_stepper
-from fem_needle.steppers import DynamicStepper, StaticStepper, Stepper
+from fem_needle.steppers import DynamicStepper, Inviscid, StaticStepper, Stepper
 from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
 
 MOST_HALVINGS = 8
@@ -252,7 +252,7 @@ def _stepper(job: _Job) -> Stepper:
             return ModalStepper(job.plant)
         return DynamicStepper(job.plant, collocation(_spectral_radius(job)))
     if job.choice.analysis == "static":
-        return StaticStepper(job.plant)
+        return StaticStepper(Inviscid(job.plant))
     return inertia_free_stepper(job.plant)
 
 

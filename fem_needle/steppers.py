@@ -329,6 +329,14 @@ class Massless:
         return 0.0
 
 
+class Inviscid(Massless):
+    """A plant whose inertia and viscosity are left out: equilibria know no rates."""
+
+    def operators(self, depth: float, time: float) -> Operators:
+        """Return the matrices without M, S, R and without C, D, E."""
+        return replace(super().operators(depth, time), damping=None, drag=None, slip=None)
+
+
 @dataclass(frozen=True, eq=False)
 class StaticStepper:
     """A sequence of equilibria; the nodes between serve the works."""

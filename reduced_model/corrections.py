@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import FiniteElementNeedle
+from fem_needle.beam_needle import points_of
+from fem_needle.exact.krylov import characteristic_number
 from fem_needle.gauss import gauss_rule
 from fem_needle.loads import LoadCase, load_case
 from fem_needle.plant import Plant
@@ -28,6 +30,9 @@ Array = NDArray[np.float64]
 
 REFERENCE_ELEMENTS = 64
 DEPTHS = 4  # of a run in which the needle moves
+LARGEST_NUMBER = 14.0  # (k/4EI)^(1/4) l up to which the clamped solutions are exact
+PUSH_INSTANTS = 101  # at which the sense of a push is looked at
+NEAR_HUB = 1e-3  # of the depth at which the hub meets a guide or a finger: no response is taken deeper
 SHALLOW = 0.05  # of the length: no response is taken shallower
 INDEPENDENCE = 1e-9  # of a shape's bending energy: what must be new in it
 
@@ -113,6 +118,21 @@ def correction_sets(scene: Scene, modes: ModeSet, span: float) -> list[FunctionS
     return [CorrectionSet(modes, responses, span, combinations)] if len(combinations) else []
 
 
+def correction_warnings(scene: Scene) -> tuple[str, ...]:
+    """Return where rounding spoils the corrections: the clamped solutions of very stiff tissue grow as exp((k/4EI)^(1/4) l)."""
+    model = scene.model
+    if not model.static_corrections or scene.support.kind == "hub" or model.basis != "full-length":
+        return ()
+    moduli = [layer.foundation_modulus for layer in scene.tissue.layers]
+    number = float(characteristic_number(max(moduli, default=0.0) / scene.needle.bending_stiffness)) * scene.needle.length
+    if number <= LARGEST_NUMBER:
+        return ()
+    return (
+        f"(k/4EI)^(1/4) l = {number:.3g} > {LARGEST_NUMBER:g}: static corrections of the full length lose their digits; "
+        "take basis 'inserted-length' or model 'fem'",
+    )
+
+
 def _responses(scene: Scene, span: float) -> Iterator[FunctionSet]:
     factor = as_function(scene.tissue.stiffness_factor)
     if scene.support.kind == "entry" and span == scene.needle.length:
@@ -137,16 +157,27 @@ def _times(scene: Scene) -> list[float]:
 
 
 def _depths(scene: Scene) -> list[float]:
-    length = scene.needle.length
-    lowest, highest = scene.insertion.depth_range(scene.duration)
-    if scene.insertion.kind == "force":
-        lowest, highest = scene.insertion.first_depth, scene.insertion.final_depth or length
-    lowest, highest = (min(max(depth, SHALLOW * length), length) for depth in (lowest, highest))
+    """Return one depth of a needle that hardly moves, else the points of Chebyshev and Lobatto of the run's depths."""
+    length, points = scene.needle.length, points_of(scene)
+    reach = length
+    if points:  # deeper than this the hub meets one of them
+        reach = (1 - NEAR_HUB) * (length + min(point.position for point in points))
+    lowest, highest = (min(max(depth, SHALLOW * length), reach) for depth in _depth_range(scene))
     if highest - lowest < SHALLOW * length:
         return [highest]
     middle, half = 0.5 * (highest + lowest), 0.5 * (highest - lowest)
     angles = np.pi * np.arange(DEPTHS) / (DEPTHS - 1)
-    return (middle - half * np.cos(angles)).tolist()  # the points of Chebyshev and Lobatto
+    return (middle - half * np.cos(angles)).tolist()
+
+
+def _depth_range(scene: Scene) -> tuple[float, float]:
+    """Return the depths between which the run may be [m]; a push draws out as far as it can."""
+    if scene.insertion.kind != "force":
+        return scene.insertion.depth_range(scene.duration)
+    push = as_function(scene.insertion.push_force or 0.0)
+    instants = np.linspace(0.0, scene.duration or 1.0, PUSH_INSTANTS).tolist()
+    lowest = 0.0 if min(push.value(time) for time in instants) < 0.0 else scene.insertion.first_depth
+    return lowest, scene.insertion.final_depth or scene.needle.length
 
 
 def _unit_responses(plant: FiniteElementNeedle, depth: float, time: float, stretch: float) -> Iterator[FunctionSet]:

@@ -20,7 +20,7 @@ from fem_needle.errors import SceneError
 from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
 from fem_needle.plant import Operators
 from fem_needle.scene import Scene
-from reduced_model.corrections import correction_sets
+from reduced_model.corrections import correction_sets, correction_warnings
 from reduced_model.growing_beam import FixedFrame, GrowingBeam
 from reduced_model.modes import MOST_MODES
 from reduced_model.shapes import FunctionSet, LineShapes, ModeSet, joined
@@ -29,8 +29,9 @@ from reduced_model.variants import check_variant, printed_mistakes, printed_stif
 Array = NDArray[np.float64]
 
 INDEPENDENT_MODES = 2  # of the full length, that are told apart at any depth
-STEADY_MODES = 3  # combinations of more of them, which a step does not resolve, grow with the depth unless they are damped
-STABLE_SPECTRAL_RADIUS = 0.9
+# What a step does not resolve must be damped: combinations of nearly parallel modes, whose bending grows as a high power of the
+# depth, and the force of a rigid guide on smooth shapes, an index-3 constraint.
+STABLE_SPECTRAL_RADIUS = 0.0
 RESOLUTION = 1e-14  # a hundred roundings: below it the mass of a combination of modes is noise
 
 
@@ -93,8 +94,8 @@ class AssumedModeNeedle(BeamNeedle):
         grown = shapes.size - 2 if isinstance(frame, FixedFrame) else 0
         self.nearly_dependent = grown > INDEPENDENT_MODES
         self.axial_force_acts = scene.model.variant == "conservative"
-        self.warnings = variant_warnings(scene)
-        if grown > STEADY_MODES:
+        self.warnings = (*variant_warnings(scene), *correction_warnings(scene))
+        if self.nearly_dependent or any(guide.stiffness == "rigid" for guide in scene.support.guides):
             self.largest_spectral_radius = STABLE_SPECTRAL_RADIUS
 
     def operators(self, depth: float, time: float) -> Operators:

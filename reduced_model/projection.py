@@ -16,7 +16,7 @@ from fem_needle import FiniteElementNeedle, banded
 from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Points, RestTerms
 from reduced_model.bases import Basis
-from reduced_model.needle import INDEPENDENT_MODES, STABLE_SPECTRAL_RADIUS, STEADY_MODES, resolved_directions
+from reduced_model.needle import INDEPENDENT_MODES, STABLE_SPECTRAL_RADIUS, resolved_directions
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,9 @@ class ProjectedNeedle:
         self.prescribed = needle.prescribed
         self.smallest_depth = needle.smallest_depth
         self.deflection_at_one = self.straight(1.0, 0.0)
-        self.largest_spectral_radius = STABLE_SPECTRAL_RADIUS if basis.moves and basis.count > STEADY_MODES else 1.0
+        parallel = basis.moves and basis.count > INDEPENDENT_MODES
+        guided = any(guide.stiffness == "rigid" for guide in needle.scene.support.guides)
+        self.largest_spectral_radius = STABLE_SPECTRAL_RADIUS if parallel or guided else 1.0
         self.warnings = needle.warnings
         self._rigid = np.column_stack([needle.straight(1.0, 0.0), needle.straight(0.0, 1.0)])
 

@@ -13,6 +13,8 @@ Both are ``fixed-frame``. Where they differ from the conservative model:
   4. In that row the derivative of the Lagrangian by the rate of q_2 was subtracted in place of that by q_2:
      -rho A (M_12 q_1' + M_22 q_2'), of the wrong unit, acts as a negative damping, and the second mode grows without bound.
   5. As in ``corrected``, the row of the insertion lacks dL/dz.
+
+  These equations have no equilibrium. Starts and gains at rest are those of the energies, which are the right ones.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.errors import SceneError
-from fem_needle.scene import Scene
+from fem_needle.scene import Scene, as_function
 
 Array = NDArray[np.float64]
 
@@ -56,8 +58,10 @@ def variant_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def printed_stiffness(scene: Scene) -> float:
-    """Return the number that the printed equations have for k."""
-    return scene.tissue.layers[0].foundation_modulus if scene.tissue.layers else float(scene.tissue.tip_stiffness or 0.0)
+    """Return the number that the printed equations have for k, times a constant stiffness factor."""
+    layers = scene.tissue.layers
+    number = layers[0].foundation_modulus if layers else float(scene.tissue.tip_stiffness or 0.0)
+    return number * as_function(scene.tissue.stiffness_factor).value(0.0)
 
 
 def printed_mistakes(

@@ -6,9 +6,9 @@ import pytest
 from fem_needle import FiniteElementNeedle, SceneError, banded, load_scene, run_scene, simulate, solve_static
 from fem_needle.exact import exact_static
 from fem_needle.free_response import natural_frequencies
-from fem_needle.scene import Layer, Model, TipLoad
+from fem_needle.scene import Guide, Initial, Insertion, LateralLoad, Layer, Model, TipLoad
 from reduced_model import AssumedModeNeedle
-from tests.consistency.scenes import BUZZ, DAMPED, LAYERS, NEEDLE, held, moving, scene_of
+from tests.consistency.scenes import BUZZ, DAMPED, GEL, LAYERS, NEEDLE, held, moving, scene_of
 from tests.reduced.two_modes import TwoModes, integral, mode
 
 THESIS = (Layer(start=0.0, foundation_modulus=520.0),)
@@ -222,6 +222,73 @@ def test_more_modes_are_pushed_like_the_elements(modes):
     run = simulate(AssumedModeNeedle(scene, modes=modes), **settings)
     assert run.depth[1:] - 0.02 == pytest.approx(expected.depth[1:] - 0.02, rel=1e-3)
     assert run.summary["stop_reason"] == "duration"
+
+
+@pytest.mark.parametrize("step", [2e-4, 5e-5])
+@pytest.mark.parametrize("modes", [3, 12, 30])
+def test_full_length_modes_are_stable_at_coarse_steps(modes, step):
+    """Combinations of modes that a step does not resolve grow with the depth: they must be damped."""
+    scene = scene_of("entry", moving(2.0, 0.02, 0.06), GEL, duration=None)
+    settings = {"time_step": step, "analysis": "dynamic", "output_step": 2e-3}
+    expected = simulate(FiniteElementNeedle(scene, elements=12), **settings).tip_deflection
+    run = simulate(AssumedModeNeedle(scene, modes=modes), **settings)
+    assert np.max(np.abs(run.tip_deflection - expected)) < 1e-4 * np.max(np.abs(expected))
+    assert run.summary["relative_energy_residual"] < 1e-5
+    assert "spectral_radius" in run.summary["warnings"][0]
+
+
+def test_three_modes_travel_far_at_a_coarse_step():
+    scene = scene_of("entry", moving(0.05, 0.005, 0.18), GEL, duration=None, initial=Initial(shape="straight"))
+    settings = {"time_step": 5e-3, "analysis": "dynamic", "output_step": 0.1}
+    expected = simulate(FiniteElementNeedle(scene, elements=12), **settings).tip_deflection
+    run = simulate(AssumedModeNeedle(scene, modes=3), **settings)
+    assert np.max(np.abs(run.tip_deflection - expected)) < 1e-2 * np.max(np.abs(expected))
+
+
+@pytest.mark.parametrize("step", [2e-4, 5e-5])
+def test_modes_under_a_rigid_guide_stay_calm_as_the_step_falls(step):
+    scene = scene_of("hub", moving(1.0, 0.04, 0.07), GEL, support={"guides": [Guide(position=-0.025)]}, duration=None)
+    settings = {"time_step": step, "analysis": "dynamic", "output_step": 6e-3}
+    expected = simulate(FiniteElementNeedle(scene, elements=16), **settings)
+    run = simulate(AssumedModeNeedle(scene, modes=12, static_corrections=True), **settings)
+    assert run.summary["relative_energy_residual"] < 1e-6
+    assert np.max(np.abs(run.tip_deflection - expected.tip_deflection)) < 1e-4 * np.max(np.abs(expected.tip_deflection))
+    assert run.hub_force[1:] == pytest.approx(expected.hub_force[1:], abs=0.02 * np.max(np.abs(expected.hub_force)))
+
+
+@pytest.mark.parametrize("make", [lambda s: FiniteElementNeedle(s, elements=12), lambda s: AssumedModeNeedle(s, modes=8)])
+def test_equilibria_feel_no_viscosity(make):
+    damped = (Layer(start=0.0, foundation_modulus=5e3, damping=30.0),)
+    runs = [
+        simulate(make(scene_of("hub", moving(1.0, 0.04, 0.08), layers, duration=None)), analysis="static", output_step=0.01)
+        for layers in (damped, GEL)
+    ]
+    for name in ("tip_deflection", "hub_force", "hub_moment", "tissue_force"):
+        found, expected = (getattr(run, name) for run in runs)
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-12), name
+    assert np.all(runs[0].tissue_dissipation == 0.0)
+
+
+def test_corrections_of_a_needle_that_is_drawn_out():
+    stiff = (Layer(start=0.0, foundation_modulus=5e4),)
+    loads = [LateralLoad(position=-0.02, force=0.1)]
+    push = Insertion(kind="force", initial_depth=0.12, push_force=-3.0)
+    scene = scene_of("hub", push, stiff, loads, duration=0.1)
+    for depth in (0.03, 0.05, 0.08):
+        tips = [
+            solve_static(plant, depth=depth).tip_deflection
+            for plant in (AssumedModeNeedle(scene, modes=2, static_corrections=True), FiniteElementNeedle(scene, elements=24))
+        ]
+        assert tips[0] == pytest.approx(tips[1], rel=0.03)
+
+
+def test_corrections_in_very_stiff_tissue_warn():
+    scene = scene_of("entry", held(0.1), (Layer(start=0.0, foundation_modulus=1e8),))
+    assert "lose their digits" in AssumedModeNeedle(scene, static_corrections=True).warnings[0]
+    assert AssumedModeNeedle(scene, static_corrections=True, basis="inserted-length").warnings == ()
+    assert AssumedModeNeedle(scene).warnings == ()
+    exact_still = scene_of("entry", held(0.1), (Layer(start=0.0, foundation_modulus=2e6),))
+    assert abs(tip_error(exact_still, 0.1, static_corrections=True)) < 1e-6
 
 
 def test_modes_of_the_reference_are_the_textbook_ones():
