@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from math import inf, pi
 
 from fem_needle.errors import SuspiciousValueWarning
-from fem_needle.scene import Scene, TipLoad
+from fem_needle.scene import Model, Scene, TipLoad
 from fem_needle.scene.listing import entries
 from fem_needle.scene.time_functions import Sinusoid, Table
 from fem_needle.scene.time_quantity import TimeValue, extremes
@@ -20,7 +20,7 @@ NOT_YOUNGS_MODULUS = (
 
 def suspicious(scene: Scene) -> tuple[str, ...]:
     """Return a message for each suspicious value; none for an ordinary scene."""
-    checks = (_units, _needle, _layers, _push, _tip_force, _times)
+    checks = (_units, _needle, _layers, _push, _tip_force, _times, _model)
     return tuple(message for check in checks for message in check(scene))
 
 
@@ -134,6 +134,20 @@ def _tip_load(load: TipLoad, modulus: float) -> float:
     if load.force is not None:
         return _largest(load.force)
     return abs(load.bevel_coefficient or 0.0) * modulus
+
+
+def _model(scene: Scene) -> Iterator[str]:
+    """Tell what is set for another model than the scene's."""
+    model, numerics = scene.model, scene.numerics
+    if model.kind == "fem":
+        plain = Model()
+        for name in ("modes", "variant", "basis", "static_corrections"):
+            value = getattr(model, name)
+            if value != getattr(plain, name):
+                effect = "only makes it fixed-frame" if name == "variant" else "has no effect"
+                yield f"model.{name} = {value!r} {effect}: model.kind = 'fem', not 'assumed-modes'"
+    if model.kind == "assumed-modes" and (numerics.elements != "auto" or numerics.mesh is not None):
+        yield "numerics.elements or mesh has no effect: model.kind = 'assumed-modes', not 'fem'"
 
 
 def _times(scene: Scene) -> Iterator[str]:

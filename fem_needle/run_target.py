@@ -12,6 +12,7 @@ from fem_needle.manifest import is_run_folder
 # What a run folder holds, exports of an older run included; `force` removes this and nothing else.
 EXPORTS = ("series.csv", "deflection.csv", "series.mat", "deflection.vtkhdf")
 FILES = ("summary.json", "series.nc", "deflection.pvd", *EXPORTS, "scene.toml", "manifest.json")
+STUDIES = ("converge.json", "compare.json", "analyze.json")
 FRAMES = (("needle", "*.vtp"), ("tissue", "*.vtu"))
 
 
@@ -27,11 +28,14 @@ class RunTarget:
         Replace the run that is there.
     numbered
         Take ``path-2``, ``path-3``, ... where ``path`` exists.
+    for_study
+        Whether a study goes there, which may replace a study; a run may not.
     """
 
     path: Path
     force: bool = False
     numbered: bool = False
+    for_study: bool = False
 
     def check(self) -> None:
         """Refuse, before anything is computed, what `create` would refuse.
@@ -51,6 +55,8 @@ class RunTarget:
             raise SceneError(f"{self.path}: exists and is no run folder; it is left as it is (name another folder)")
         if not self.force:
             raise SceneError(f"{self.path}: exists already; --force (force=True) replaces the run in it")
+        if not self.for_study and any((self.path / name).exists() for name in STUDIES):
+            raise SceneError(f"{self.path}: holds a study, not a run; it is left as it is (name another folder)")
         if any((self.path / name).is_symlink() for name, _ in FRAMES):
             raise SceneError(f"{self.path}: holds links in place of folders; it is left as it is")
 

@@ -24,7 +24,7 @@ from fem_needle.errors import SceneError
 from fem_needle.linear.linearization import Axial, linearize, reach
 from fem_needle.linear.modal_form import AXIAL, modal
 from fem_needle.linear.model import LinearModel
-from fem_needle.models import build_plant
+from fem_needle.models import build_plant, model_family
 from fem_needle.motion import depth_law, run_duration
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene
@@ -119,6 +119,7 @@ class Analysis:
     axial: Axial
     points: tuple[DepthAnalysis, ...]
     curve: DepthGains
+    warnings: tuple[str, ...] = ()
 
     @property
     def depths(self) -> Array:
@@ -138,7 +139,7 @@ class Analysis:
             "outputs": [asdict(signal) for signal in first.outputs],
             "depths": [_plain(one) for one in self.points],
             "sign_changes": [asdict(change) for change in self.curve.sign_changes],
-            "warnings": list(self.plant.warnings),
+            "warnings": list(self.warnings),
         }
 
     def columns(self) -> Mapping[str, Sequence[Any]]:
@@ -187,7 +188,13 @@ def analyze(
         raise SceneError(f"depths: given twice or not at all (got {chosen}; allowed different depths)")
     models = [linearize(plant, depth=depth, time=time, speed=speed, axial=axial) for depth in chosen]
     points = tuple(_analyzed(plant, model) for model in models)
-    return Analysis(plant, axial, points, depth_gains(plant, time=time))
+    warnings = (*plant.warnings, *_range_warnings(scene))
+    return Analysis(plant, axial, points, depth_gains(plant, time=time), warnings)
+
+
+def _range_warnings(scene: Scene) -> tuple[str, ...]:
+    """Return what a model of few coordinates says of its range; the elements of an analysis are enough."""
+    return () if scene.model.kind == "fem" else model_family(scene.model.kind).choose(scene, "dynamic").warnings
 
 
 def scene_depths(scene: Scene) -> list[float]:

@@ -76,7 +76,7 @@ def analyze(
         loaded = with_lateral_force(loaded, number("--lateral-position", lateral_position, "m"))
     wanted = _wanted(depth, time, speed) | {"axial": axial}
     path = RUNS / f"{Path(scene).stem}-{NAME}" if out is None else out
-    _analyze(loaded, wanted, StudyFolder(NAME, RunTarget(path, force, numbered=out is None)), quiet=as_json)
+    _analyze(loaded, wanted, StudyFolder(NAME, RunTarget(path, force, numbered=out is None, for_study=True)), quiet=as_json)
 
 
 def _wanted(depth: list[str] | None, time: str, speed: str) -> dict[str, Any]:
@@ -98,7 +98,7 @@ def _analyze(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet
     folder.check()
     analysis = compute(scene, **wanted)
     plain = analysis.to_dict()
-    for warning in analysis.plant.warnings:
+    for warning in analysis.warnings:
         typer.echo(f"warning: {warning}", err=True)
     written = folder.write(scene, plain, analysis.columns(), analysis_picture(analysis))
     try:

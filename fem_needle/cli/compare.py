@@ -70,7 +70,7 @@ def compare(
     wanted: dict[str, Any] = {"reference": reference, "model": model, "modes": tuple(modes or ()), "within": within}
     wanted |= {"variant": variant, "basis": basis, "static_corrections": static_corrections or None}
     wanted["depths"] = None if depth is None else [_length(text) for text in depth]
-    target = RunTarget(out or RUNS / f"{Path(scene).stem}-{NAME}", force, numbered=out is None)
+    target = RunTarget(out or RUNS / f"{Path(scene).stem}-{NAME}", force, numbered=out is None, for_study=True)
     comparison = _compare(loaded, wanted, StudyFolder(NAME, target), quiet=as_json)
     _require(comparison, require_error)
 

@@ -67,7 +67,7 @@ def converge(
         "numerics.analysis": analysis,
     }
     loaded = changed(load_scene(scene), assignments or (), options)
-    target = RunTarget(out or RUNS / f"{Path(scene).stem}-{NAME}", force, numbered=out is None)
+    target = RunTarget(out or RUNS / f"{Path(scene).stem}-{NAME}", force, numbered=out is None, for_study=True)
     study = _study(loaded, over, values, StudyFolder(NAME, target), quiet=as_json)
     _require(study, require_rate, require_error)
 

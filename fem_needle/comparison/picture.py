@@ -86,6 +86,7 @@ def _draw_shapes(axes: Axes, comparison: Comparison) -> None:
 
 def _draw_errors(axes: Axes, comparison: Comparison) -> None:
     """Draw |tip error| at rest over the depth, and the error of the range."""
+    drawn = False
     for index, model in enumerate(comparison.models):
         curve, states = model.curve, model.answer.curve
         if curve is None or states is None:
@@ -93,12 +94,18 @@ def _draw_errors(axes: Axes, comparison: Comparison) -> None:
         errors = np.abs(curve.tip)
         shown = np.where(np.isfinite(errors) & (errors > SMALLEST), errors, np.nan)
         axes.plot(MILLIMETERS * states.depths, 100 * shown, **_style(index))
+        if np.isfinite(shown).any():
+            drawn = True
+        else:
+            axes.set_xlim(MILLIMETERS * states.depths[0], MILLIMETERS * states.depths[-1])
         chosen = np.array([] if model.chosen is None else np.abs(model.chosen.tip))
         places = MILLIMETERS * np.array(comparison.depths)
         marker = MARKERS[index % len(MARKERS)]
         dots = chosen > SMALLEST
         axes.plot(places[dots], 100 * chosen[dots], marker=marker, color=COLORS[index % len(COLORS)], linestyle="none")
     axes.axhline(100 * comparison.within, color=INK, linewidth=1.2, linestyle=":")
+    if not drawn:
+        axes.text(0.5, 0.75, "no error to show", transform=axes.transAxes, ha="center")
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(numticks=7))
     axes.set(xlabel="depth [mm]", ylabel="|tip error| [%]")

@@ -143,6 +143,7 @@ def levels_of(setting: Setting, values: Sequence[float]) -> tuple[Level, ...]:
         path = PATHS[setting.over]
         scenes = [setting.scene.with_values(overriding({path: value})) for value in values]
         makers = [partial(family.build, scene) for scene in scenes]
+        _refuse_unchanged(setting, [makers[0](), makers[-1]()])
         levels = tuple(solve_level(setting, make, value) for make, value in zip(makers, values, strict=True))
     _refuse_equal(setting, levels)
     return levels
@@ -248,6 +249,14 @@ def _equilibria(scene: Scene, times: Sequence[float], plant: Plant) -> tuple[Arr
     return np.array(times), np.array([rest.tip_deflection for rest in rests]), rests[-1].deflection(stations)
 
 
+def _refuse_unchanged(setting: Setting, plants: Sequence[Plant]) -> None:
+    """Refuse, before anything is computed, a model that knows nothing of what is varied."""
+    if len({plant.size for plant in plants}) == 1:
+        kind = setting.scene.model.kind
+        other = "assumed-modes" if setting.over == "modes" else "fem"
+        raise SceneError(f"over: got {setting.over!r}; the model {kind!r} does not change with it, {other!r} does (--model)")
+
+
 def _refuse_equal(setting: Setting, levels: Sequence[Level]) -> None:
     """Refuse rows that are the same discretization."""
     sizes = [level.size for level in levels]
@@ -255,6 +264,3 @@ def _refuse_equal(setting: Setting, levels: Sequence[Level]) -> None:
         found = ", ".join(f"{level.value:g} s gives {level.size:g} s" for level in levels)
         limits = f"an output every {setting.output_step:g} s and kinks of the motion shorten steps"
         raise SceneError(f"values: two time steps are the same ({found}; {limits}: use shorter steps or a longer output step)")
-    if setting.over != "time-step" and len({level.plant.size for level in levels}) == 1:
-        kind = setting.scene.model.kind
-        raise SceneError(f"over: got {setting.over!r}; the model {kind!r} does not change with it, another may (model)")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from fem_needle.mesh_file import length_mistake
 from fem_needle.scene.loads import LateralLoad
 from fem_needle.scene.part import Mistake
+from fem_needle.scene.settings import FIXED_FRAME_VARIANTS
 
 if TYPE_CHECKING:
     from fem_needle.scene.scene import Scene
@@ -94,7 +95,10 @@ def _place_mistakes(scene: Scene) -> Iterator[Mistake]:
 
 
 def _kinematics_mistakes(scene: Scene) -> Iterator[Mistake]:
-    if scene.model.kinematics == "fixed-frame":
+    if scene.model.variant in FIXED_FRAME_VARIANTS:
+        limits = f"got '{scene.model.variant}'; allowed 'conservative'"
+        yield Mistake("model.variant", f"is fixed-frame, which has no meaning under 'hub' ({limits})", scene.model.variant)
+    elif scene.model.kinematics == "fixed-frame":
         message = "has no meaning under the support 'hub' (got 'fixed-frame'; allowed 'material')"
         yield Mistake("model.kinematics", message, "fixed-frame")
 

@@ -310,7 +310,7 @@ def test_impossible_settings(settings, message):
 
 
 def test_fixed_frame_variants_need_entry():
-    with pytest.raises(SceneError, match="kinematics"):
+    with pytest.raises(SceneError, match="is fixed-frame"):
         AssumedModeNeedle(scene_of("hub", held(0.1)), variant="corrected")
 
 

@@ -130,7 +130,7 @@ def test_the_table_says_what_was_compared_how(compare):
         (("thesis", "--modes", "201"), "model.modes"),
         (("thesis", "--depth", "5 N"), "--depth"),
         (("thesis", "--variant", "as-printed"), "initial.shape: 'as-printed' has no equilibrium"),
-        (("release", "--variant", "corrected"), "model.kinematics"),
+        (("release", "--variant", "corrected"), "model.variant: is fixed-frame"),
         (("thesis", "--model", "rope"), "unknown model"),
     ],
 )

@@ -209,9 +209,13 @@ def test_values_of_the_command_line():
     assert value_of("1\nother = 2") == "1\nother = 2"
 
 
+# Tests that run in the background inherit an ignored interrupt.
+OBEDIENT = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from fem_needle.cli import main; main()"
+
+
 def started(tmp_path) -> subprocess.Popen[str]:
     """Start a long run and wait until some frames are listed."""
-    command = [sys.executable, "-m", "fem_needle", "run", "thesis", *LONG]
+    command = [sys.executable, "-c", OBEDIENT, "run", "thesis", *LONG]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     collection, until = tmp_path / "runs" / "thesis" / "deflection.pvd", time.monotonic() + 60
     while time.monotonic() < until and process.poll() is None:
