@@ -54,7 +54,7 @@ class RunTarget:
         if not is_run_folder(self.path):
             raise SceneError(f"{self.path}: exists and is no run folder; it is left as it is (name another folder)")
         if not self.force:
-            raise SceneError(f"{self.path}: exists already; --force (force=True) replaces the run in it")
+            raise SceneError(f"{self.path}: exists already; --force (force=True) replaces what is in it")
         if not self.for_study and any((self.path / name).exists() for name in STUDIES):
             raise SceneError(f"{self.path}: holds a study, not a run; it is left as it is (name another folder)")
         if any((self.path / name).is_symlink() for name, _ in FRAMES):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi
+from textwrap import shorten
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,10 +21,11 @@ WIDE = 20.0  # largest gain by the median one, from which a panel is linear arou
 # By the unit of the input: what a gain is shown in, and how many of it 1 m per SI unit is.
 SHOWN = {
     "N": ("tip per force [mm/N]", 1e3),
-    "m": ("tip per way [mm/mm]", 1.0),
+    "m": ("tip per travel [mm/mm]", 1.0),
     "rad": ("tip per angle [mm/deg]", 1e3 * pi / 180.0),
     "N m": ("tip per torque [mm/(N mm)]", 1.0),
 }
+LONGEST_TITLE = 110  # characters across the picture
 LINES = ("-", (0, (6, 2)), (0, (2, 1.5)), "-.")
 
 
@@ -37,6 +39,7 @@ def analysis_picture(analysis: Analysis) -> bytes:
         for panel, unit in zip(panels, units, strict=False):
             _draw_gains(panel, curve, unit)
         _draw_frequencies(panels[-1], curve)
+        figure.suptitle(shorten(analysis.plant.scene.title, LONGEST_TITLE), x=0.01, ha="left", fontsize=9, parse_math=False)
         panels[0].set_title("Answer of the tip at rest, by input")
         panels[-1].set_xlabel("depth [mm]")
         for panel in panels:
