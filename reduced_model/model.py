@@ -8,11 +8,11 @@ import numpy as np
 
 from fem_needle import FiniteElementNeedle
 from fem_needle.choices import instants, tip_difference, tip_differences
+from fem_needle.comparison.ranges import wave_number_at_tip
 from fem_needle.free_response import natural_frequencies
 from fem_needle.modal_stepper import needs_no_steps
 from fem_needle.models import ChosenPlant
 from fem_needle.scene import Scene
-from fem_needle.segments import tip_layer
 from reduced_model.needle import AssumedModeNeedle
 
 REFERENCE_ELEMENTS = 48
@@ -28,12 +28,13 @@ class Truncation(NamedTuple):
         a held needle that vibrates.
     frequency
         Largest relative error of the lowest natural frequency.
-    depth
-        Where the larger of the two is [m].
+    time, depth
+        When [s] and where [m] the larger of the two is.
     """
 
     tip: float
     frequency: float
+    time: float
     depth: float
 
 
@@ -73,25 +74,18 @@ def truncation(plant: AssumedModeNeedle, *, dynamic: bool) -> Truncation:
     tips = tip_differences(scene, plant, reference)
     if dynamic and needs_no_steps(scene):
         found = tip_difference(scene, plant, reference, "dynamic")
-        return Truncation(max(found, float(np.max(tips))), 0.0, places[0][1])
+        return Truncation(max(found, float(np.max(tips))), 0.0, *places[0])
     frequencies = np.zeros(len(places))
     if dynamic:
         for index, (time, depth) in enumerate(places):
             true = natural_frequencies(reference, depth, time)[0]
             frequencies[index] = abs(natural_frequencies(plant, depth, time)[0] / true - 1)
     worst = int(np.argmax(np.maximum(tips, frequencies)))
-    return Truncation(float(np.max(tips)), float(np.max(frequencies)), places[worst][1])
-
-
-def characteristic_number(scene: Scene, depth: float) -> float:
-    """Return (k / 4 EI)^(1/4) z (1) with the modulus at the tip, 0 outside the layers."""
-    layer = tip_layer(scene.tissue.layers, depth)
-    modulus = 0.0 if layer is None else scene.tissue.layers[layer].foundation_modulus
-    return float((modulus / (4 * scene.needle.bending_stiffness)) ** 0.25 * depth)
+    return Truncation(float(np.max(tips)), float(np.max(frequencies)), *places[worst])
 
 
 def _warning(plant: AssumedModeNeedle, found: Truncation) -> str:
-    number = characteristic_number(plant.scene, found.depth)
+    number = wave_number_at_tip(plant.scene, found.depth, found.time) * found.depth
     what = f"the tip by {found.tip:.2g} of its largest deflection"
     if found.frequency > found.tip:
         what = f"the lowest natural frequency by {found.frequency:.2g}"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fem_needle.cli.scene_commands import SceneArgument
+from fem_needle.cli.short_path import short_path
 from fem_needle.errors import ComputationError
 
 if TYPE_CHECKING:
@@ -108,10 +109,4 @@ def _analyze(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet
     if quiet:
         typer.echo(json_bytes(plain).decode(), nl=False)
     else:
-        show_analysis(analysis, _short(written))
-
-
-def _short(folder: Path) -> Path:
-    here = Path.cwd()
-    return folder.relative_to(here) if folder.is_relative_to(here) else folder
-
+        show_analysis(analysis, short_path(written))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, cast
 import typer
 
 from fem_needle.cli.run_table import model_text
+from fem_needle.cli.short_path import short_path
 from fem_needle.cli.tables import new_table, show
 
 if TYPE_CHECKING:
@@ -40,8 +41,7 @@ def show_comparison(comparison: Comparison, folder: Path) -> None:
         typer.echo("k: modulus of the layer that holds the tip, times the stiffness factor")
     else:
         typer.echo("at rest: nothing, for this variant has no equilibrium")
-    here = Path.cwd()
-    typer.echo(f"files: {folder.relative_to(here) if folder.is_relative_to(here) else folder}")
+    typer.echo(f"files: {short_path(folder)}")
 
 
 def _reference(comparison: Comparison) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from fem_needle.cli.short_path import short_path
 from fem_needle.cli.tables import new_table, show
 
 if TYPE_CHECKING:
@@ -37,8 +38,7 @@ def show_study(study: ConvergenceStudy, folder: Path) -> None:
     typer.echo(f"reference: {study.reference}; tip {1e3 * study.reference_tip:.10g} mm")
     typer.echo(f"theory: {study.theory}")
     typer.echo(f"held fixed: {_held(study)}")
-    here = Path.cwd()
-    typer.echo(f"files: {folder.relative_to(here) if folder.is_relative_to(here) else folder}")
+    typer.echo(f"files: {short_path(folder)}")
 
 
 def _cells(row: ConvergenceRow) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from fem_needle.cli.scene_commands import SceneArgument
+from fem_needle.cli.short_path import short_path
 from fem_needle.errors import ComputationError, NeedleError
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ def _stop(writer: RunFolderWriter, run: Trajectory | None, reason: str, message:
     except NeedleError as error:
         message = f"{message}; {error}"
         summary = {"stop_reason": reason, "folder": str(writer.folder)}
-    kept = "" if writer.folder is None else f"; what was computed is in {_short(writer.folder)}"
+    kept = "" if writer.folder is None else f"; what was computed is in {short_path(writer.folder)}"
     typer.echo(f"error: {message}{kept}", err=True)
     if quiet and writer.folder is not None:
         _print_json(summary)
@@ -151,7 +152,7 @@ def _print_table(run: Trajectory, writer: RunFolderWriter, messages: Sequence[st
 
     table = new_table(run.scene.title, "", "")
     table.show_header = False
-    for row in run_rows(run, _short(writer.folder or RUNS), messages):
+    for row in run_rows(run, short_path(writer.folder or RUNS), messages):
         table.add_row(*row)
     show(table)
 
@@ -161,9 +162,3 @@ def _explain(*, to_stderr: bool) -> None:
 
     for name, meaning in EXPLANATION:
         typer.echo(f"{name}: {meaning}", err=to_stderr)
-
-
-def _short(folder: Path) -> Path:
-    """Return a path relative to the current folder where it lies inside."""
-    here = Path.cwd()
-    return folder.relative_to(here) if folder.is_relative_to(here) else folder

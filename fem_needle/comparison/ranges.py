@@ -72,16 +72,23 @@ def intervals_within(tips: Tips, depths: Array, within: float) -> tuple[tuple[fl
     return (*found, (start, knots[-1][0])) if start is not None else tuple(found)
 
 
+def wave_number_at_tip(scene: Scene, depth: float, time: float) -> float:
+    """Return (k / 4 EI)^(1/4) [1/m] with the modulus of the layer that holds the tip, swelling included; 0 outside the layers."""
+    index = tip_layer(scene.tissue.layers, depth)
+    if index is None:
+        return 0.0
+    modulus = as_function(scene.tissue.stiffness_factor).value(time) * scene.tissue.layers[index].foundation_modulus
+    return float(characteristic_number(modulus / scene.needle.bending_stiffness))
+
+
 def described(scene: Scene, time: float, ranges: tuple[tuple[float, float], ...]) -> tuple[Interval, ...]:
     """Return intervals with their characteristic numbers, cut where the tip enters another layer."""
-    layers, factor = scene.tissue.layers, float(as_function(scene.tissue.stiffness_factor).value(time))
-    found = []
+    layers, found = scene.tissue.layers, []
     for start, end in ranges:
         edges = [start, *(y for y in interfaces(layers) if start < y < end), end]
         for left, right in pairwise(edges):
-            index = tip_layer(layers, 0.5 * (left + right))
-            modulus = 0.0 if index is None else factor * layers[index].foundation_modulus
-            wave_number = float(characteristic_number(modulus / scene.needle.bending_stiffness))
+            middle = 0.5 * (left + right)
+            index, wave_number = tip_layer(layers, middle), wave_number_at_tip(scene, middle, time)
             name = "" if index is None else layers[index].name or str(index)
             found.append(Interval(left, right, name, wave_number * left, wave_number * right))
     return tuple(found)

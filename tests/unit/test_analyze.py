@@ -2,14 +2,14 @@
 
 import csv
 import json
-import sys
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy.io import loadmat
 from scipy.optimize import brentq
 
-from fem_needle import FiniteElementNeedle, SceneError, analyze, cli, load_scene, solve_static
+from fem_needle import FiniteElementNeedle, SceneError, analyze, load_scene, solve_static
 from fem_needle.analysis.depth_gains import depth_gains, tip_gains
 from fem_needle.analysis.matlab import analysis_matlab
 from fem_needle.analysis.study import scene_depths
@@ -116,18 +116,10 @@ def test_the_matlab_file_opens_again(tmp_path):
 
 
 @pytest.fixture
-def command(monkeypatch, capsys, tmp_path):
-    """Run the command as `main` does, in an empty folder; return status, stdout, stderr."""
+def command(command_line, monkeypatch, tmp_path):
+    """Run `analyze`, in an empty folder; return status, stdout, stderr."""
     monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["fem-needle", "analyze", *arguments])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        captured = capsys.readouterr()
-        return int(caught.value.code or 0), captured.out, captured.err
-
-    return run
+    return partial(command_line, "analyze")
 
 
 FEW = ("--elements", "4")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
-import sys
+from functools import partial
 
 import numpy as np
 import pytest
 from matplotlib import image
 
-from fem_needle import cli, load_scene
+from fem_needle import load_scene
 
 PRINTED = ("thesis-open-loop", "--variant", "as-printed", "--set", "insertion.final_depth=0.0202", "--time-step", "5e-5")
 FILES = {"compare.csv", "compare.json", "compare.png", "manifest.json", "scene.toml"}
@@ -18,18 +18,10 @@ SHORT = ("thesis", "--set", "insertion.final_depth=0.06", "--set", "numerics.out
 
 
 @pytest.fixture
-def compare(monkeypatch, capsys, tmp_path):
-    """Run the command as `main` does, in an empty folder; return status, stdout, stderr."""
+def compare(command_line, monkeypatch, tmp_path):
+    """Run `compare`, in an empty folder; return status, stdout, stderr."""
     monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fem-needle", "compare", *arguments])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        captured = capsys.readouterr()
-        return int(caught.value.code or 0), captured.out, captured.err
-
-    return command
+    return partial(command_line, "compare")
 
 
 def rows_of(out):

@@ -5,30 +5,22 @@ from __future__ import annotations
 import csv
 import json
 import struct
-import sys
 import zlib
+from functools import partial
 
 import pytest
 
-from fem_needle import cli, load_scene
+from fem_needle import load_scene
 
 FILES = {"converge.csv", "converge.json", "converge.png", "manifest.json", "scene.toml"}
 QUICK = ("bench-s", "--degree", "3", "--values", "4,8,16")
 
 
 @pytest.fixture
-def converge(monkeypatch, capsys, tmp_path):
-    """Run the command as `main` does, in an empty folder; return status, stdout, stderr."""
+def converge(command_line, monkeypatch, tmp_path):
+    """Run `converge`, in an empty folder; return status, stdout, stderr."""
     monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fem-needle", "converge", *arguments])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        captured = capsys.readouterr()
-        return int(caught.value.code or 0), captured.out, captured.err
-
-    return command
+    return partial(command_line, "converge")
 
 
 def png_size_and_pixels(path):

@@ -7,12 +7,13 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
 import pyvista
 
-from fem_needle import cli, load_scene
+from fem_needle import load_scene
 from fem_needle.cli import run_progress
 from fem_needle.cli.settings import value_of
 from fem_needle.errors import ComputationError
@@ -24,18 +25,10 @@ LONG = ("--analysis", "static", "--time-step", "1e-5", "--output-step", "1e-3")
 
 
 @pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run the command as `main` does, in an empty folder; return status, stdout, stderr."""
+def run(command_line, monkeypatch, tmp_path):
+    """Run `run`, in an empty folder; return status, stdout, stderr."""
     monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fem-needle", "run", *arguments])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        captured = capsys.readouterr()
-        return int(caught.value.code or 0), captured.out, captured.err
-
-    return command
+    return partial(command_line, "run")
 
 
 def test_a_run_shows_a_table_and_leaves_a_folder(run, tmp_path, monkeypatch):

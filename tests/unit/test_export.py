@@ -6,7 +6,7 @@ import csv
 import errno
 import keyword
 import re
-import sys
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -17,7 +17,7 @@ from scipy.io import loadmat
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
-from fem_needle import Guide, Insertion, Scene, Support, Trajectory, cli, load_scene, matlab_file, run_scene
+from fem_needle import Guide, Insertion, Scene, Support, Trajectory, load_scene, matlab_file, run_scene
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.export import FORMATS, export_run
 from fem_needle.run_folder import load_run, save_run
@@ -52,17 +52,9 @@ def folder(computed, tmp_path) -> Path:
 
 
 @pytest.fixture
-def export(monkeypatch, capsys):
-    """Run the command as `main` does; return status, stdout, stderr."""
-
-    def command(*arguments: str | Path) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fem-needle", "export", *map(str, arguments)])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        captured = capsys.readouterr()
-        return int(caught.value.code or 0), captured.out, captured.err
-
-    return command
+def export(command_line):
+    """Run `export`; return status, stdout, stderr."""
+    return partial(command_line, "export")
 
 
 def contents(folder: Path) -> dict[str, bytes]:

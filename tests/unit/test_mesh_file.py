@@ -11,7 +11,7 @@ import meshio
 import numpy as np
 import pytest
 
-from fem_needle import FiniteElementNeedle, Layer, Scene, cli, load_scene, mesh_file, run_scene, solve_static
+from fem_needle import FiniteElementNeedle, Layer, Scene, load_scene, mesh_file, run_scene, solve_static
 from fem_needle.errors import SceneError
 from fem_needle.mesh_file import read_mesh
 from fem_needle.run_folder import load_run
@@ -310,17 +310,10 @@ def test_the_block_fills_its_volume():
 
 
 @pytest.fixture
-def command(monkeypatch, capsys, tmp_path):
+def command(command_line, monkeypatch, tmp_path):
+    """Run the command, in an empty folder; return status, stdout, stderr."""
     monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fem-needle", *arguments])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        captured = capsys.readouterr()
-        return int(caught.value.code or 0), captured.out, captured.err
-
-    return run
+    return command_line
 
 
 SHORT = ("--set", "insertion.final_depth=0.03", "--output-step", "0.5", "--no-vtk", "--json")

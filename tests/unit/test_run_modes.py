@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 import json
-import sys
+from functools import partial
 
 import pytest
 
-from fem_needle import SceneError, cli, load_scene, run_scene
+from fem_needle import SceneError, load_scene, run_scene
 from fem_needle.cli.run_table import model_text
 
 FAST = ("--time-step", "0.02", "--output-step", "0.2", "--no-vtk")
 
 
 @pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run the command as `main` does, in an empty folder; return status, stdout, stderr."""
+def run(command_line, monkeypatch, tmp_path):
+    """Run `run`, in an empty folder; return status, stdout, stderr."""
     monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["fem-needle", "run", *arguments])
-        with pytest.raises(SystemExit) as caught:
-            cli.main()
-        captured = capsys.readouterr()
-        return int(caught.value.code or 0), captured.out, captured.err
-
-    return command
+    return partial(command_line, "run")
 
 
 def missing(warnings):
