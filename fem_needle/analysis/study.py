@@ -31,6 +31,8 @@ from fem_needle.scene import Scene
 
 Array = NDArray[np.float64]
 
+RESPONSE_RANGE = (0.0937, 2.13)  # of the first and the third natural frequency; no grid point is likely to hit one
+RESPONSE_POINTS = 61
 ELEMENTS = 16  # where the scene leaves them to the program
 SLOWEST = 6  # vibrations in which controllability is judged
 BETWEEN = 3  # depths between the first and the last
@@ -274,5 +276,21 @@ def _plain(one: DepthAnalysis) -> dict[str, Any]:
         "damping_ratios": model.damping_ratios[:SLOWEST].tolist(),
         "poles": [[float(pole.real), float(pole.imag)] for pole in model.poles[: 2 * SLOWEST + 2]],
         "static_gains": one.gains,
+        "transfer_functions": _transfer_functions(model),
         "verdicts": [asdict(verdict) for verdict in one.verdicts],
+    }
+
+
+def _transfer_functions(model: LinearModel) -> dict[str, Any]:
+    """Return magnitude and phase of the tip's answer to each input, from far below the first to beyond the third vibration."""
+    found = model.natural_frequencies
+    if not len(found):
+        return {}
+    lowest, highest = RESPONSE_RANGE[0] * float(found[0]), RESPONSE_RANGE[1] * float(found[:3][-1])
+    frequencies = np.geomspace(lowest, highest, RESPONSE_POINTS)
+    answers = {signal.name: model.transfer_function("tip_deflection", signal.name, frequencies) for signal in model.inputs}
+    return {
+        "frequencies": frequencies.tolist(),
+        "magnitudes": {name: np.abs(answer).tolist() for name, answer in answers.items()},
+        "phases": {name: np.angle(answer).tolist() for name, answer in answers.items()},
     }

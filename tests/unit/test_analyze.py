@@ -153,6 +153,14 @@ def test_json_and_a_lateral_force_that_the_scene_has_not(command):
     assert plain["inputs"][0]["name"] == "lateral_force"
     assert plain["axial"] == "held"
     assert "push" not in plain["depths"][0]["static_gains"]
+    response, one = plain["depths"][0]["transfer_functions"], plain["depths"][0]
+    below, first = response["frequencies"][0], one["natural_frequencies"][0]
+    # Far below the first vibration the tip answers its own force statically, raised by 1 / (1 - ratio^2) at most.
+    static, found = one["static_gains"]["tip_force"], response["magnitudes"]["tip_force"]
+    assert static * (1.0 - 1e-9) <= found[0] <= static / (1.0 - (below / first) ** 2)
+    assert abs(response["phases"]["tip_force"][0]) < 1e-9
+    assert max(found) > 2.0 * static
+    assert set(response["magnitudes"]) == set(response["phases"]) == {signal["name"] for signal in plain["inputs"]}
     assert command("release", *FEW, "--out", "one")[0] == 2
     assert command("release", *FEW, "--out", "one", "--force")[0] == 0
 
