@@ -46,7 +46,14 @@ class StudyFolder:
         if (self.target.path / RUN_FILE).exists() and (self.target.force or not self.target.numbered):
             raise SceneError(f"{self.target.path}: holds a run, not a study; it is left as it is (name another folder)")
 
-    def write(self, scene: Scene, result: Any, columns: Mapping[str, Sequence[Any]], picture: bytes) -> Path:
+    def write(
+        self,
+        scene: Scene,
+        result: Any,
+        columns: Mapping[str, Sequence[Any]],
+        picture: bytes,
+        others: Mapping[str, bytes] | None = None,
+    ) -> Path:
         """Write the files, each whole or not at all, and return the folder.
 
         Parameters
@@ -59,6 +66,8 @@ class StudyFolder:
             Header, such as ``error [1]``, and a value for each row; None is left empty.
         picture
             A PNG.
+        others
+            Further files by name.
 
         Raises
         ------
@@ -75,6 +84,7 @@ class StudyFolder:
             f"{self.name}.json": json_bytes(result),
             f"{self.name}.csv": csv_bytes(columns),
             f"{self.name}.png": picture,
+            **(others or {}),
         }
         try:
             for name, content in files.items():

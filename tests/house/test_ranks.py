@@ -70,6 +70,7 @@ RANKS = {
     "analysis": 16,
     "convergence": 17,
     "comparison": 17,
+    "benchmark": 18,
     "run_folder": 14,
     "csv_file": 13,
     "matlab_file": 13,

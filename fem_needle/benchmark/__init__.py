@@ -1,0 +1,1 @@
+"""Run time against error: this program, exact solutions, common libraries and rivals on the same cases."""

@@ -1,0 +1,193 @@
+"""Measurements of single goals; each raises an error that says why where it cannot be done."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from itertools import pairwise
+from math import log2
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.benchmark.cases import Case, cases_of
+from fem_needle.benchmark.loop import whole_loop, whole_run
+from fem_needle.benchmark.methods import Setting
+from fem_needle.benchmark.own_methods import AssumedModes, FixedElements, ToleranceElements
+from fem_needle.benchmark.random_scenes import random_scene
+from fem_needle.benchmark.reference import reference_tips
+from fem_needle.benchmark.result import Row
+from fem_needle.benchmark.timing import seconds
+from fem_needle.errors import NeedleError
+from fem_needle.models import build_plant
+
+Array = NDArray[np.float64]
+
+ELEMENTS, STEP = 40, 5e-4  # s
+ROUNDS = 3
+HIT_RATE = 99.0  # %
+BATCH = 10_000
+PROCESS_ROUNDS = 5
+MICROSECONDS = 1e6
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measured value in the unit of its goal, and by what."""
+
+    value: float
+    note: str = ""
+
+
+def _case(name: str) -> Case:
+    return cases_of([name])[0]
+
+
+def _loop(name: str, step: float) -> Callable[[], Array]:
+    case = _case(name)
+    return whole_loop(build_plant(FixedElements().scene(case, Setting(elements=ELEMENTS, time_step=step))))
+
+
+@cache
+def time_per_step(name: str) -> Measured:
+    """Return the median time of a step of a case with 40 elements and steps of 0.5 ms, the loop as a whole [us]."""
+    call, case = _loop(name, STEP), _case(name)
+    call()
+    times = [seconds(call) for _ in range(ROUNDS)]
+    steps = Setting(time_step=STEP).steps(case) or 1
+    return Measured(MICROSECONDS * median(times) / steps, f"{steps} steps in {1e3 * median(times):.4g} ms")
+
+
+@cache
+def error_of_loop(name: str, step: float = STEP) -> Measured:
+    """Return the error of a case with 40 elements (1)."""
+    case = _case(name)
+    return Measured(case.error(_loop(name, step)(), reference_tips(case)))
+
+
+def order_of_loop() -> Measured:
+    """Return the smallest order in time that the errors of M2 on 40 elements show, above what its start leaves behind."""
+    steps = (1e-2, 5e-3, 2.5e-3)
+    errors = [error_of_loop("M2", step).value for step in steps]
+    orders = [log2(coarse / fine) for coarse, fine in pairwise(errors)]
+    shown = ", ".join(f"{1e3 * step:g} ms {error:.1e}" for step, error in zip(steps, errors, strict=True))
+    return Measured(min(orders), shown)
+
+
+@cache
+def hit_rate(scenes: int) -> Measured:
+    """Return in how many of a number of random scenes the true error is within the tolerance [%].
+
+    Scenes without an answer in time are counted apart.
+
+    Raises
+    ------
+    NeedleError
+        If no scene gives one.
+    """
+    kept = missed = refused = 0
+    for seed in range(scenes):
+        example = random_scene(seed)
+        scale = float(np.max(np.abs(example.tips)))
+        try:
+            tips = whole_run(example.scene)()
+        except NeedleError:
+            refused += 1
+            continue
+        error = float(np.max(np.abs(tips - example.tips))) / scale
+        kept, missed = kept + (error <= example.scene.numerics.tolerance), missed + (error > example.scene.numerics.tolerance)
+    if not kept + missed:
+        raise NeedleError(f"none of {scenes} scenes gave an answer in time")
+    return Measured(100.0 * kept / (kept + missed), f"{missed} missed, {refused} without an answer in time")
+
+
+def cost_of_tolerance(rows: Sequence[Row]) -> Measured:
+    """Return the largest cost of a tolerance over that of the cheapest fixed elements that keep it (1).
+
+    Both are whole runs, from the scene on.
+
+    Raises
+    ------
+    NeedleError
+        If no tolerance of the benchmark has a fixed setting that keeps it.
+    """
+    worst: Measured | None = None
+    fixed = [row for row in rows if row.method == FixedElements.name and row.whole is not None]
+    for row in rows:
+        if row.method != ToleranceElements.name or row.median is None or row.setting.tolerance is None:
+            continue
+        keeping = [one for one in fixed if one.case == row.case and (one.error or 0.0) <= row.setting.tolerance]
+        if keeping:
+            best = min(keeping, key=lambda one: one.whole or 0.0)
+            ratio = row.median / (best.whole or 1.0)
+            if worst is None or ratio > worst.value:
+                worst = Measured(ratio, f"{row.case}, {row.setting.label} against {best.setting.label}")
+    if worst is None:
+        raise NeedleError("no fixed setting keeps a tolerance that was run")
+    return worst
+
+
+def _two_modes(step: float) -> Callable[[], Array]:
+    case = _case("M2")
+    scene = AssumedModes().scene(case, Setting(modes=2, variant="full-length", time_step=step))
+    return whole_loop(build_plant(scene.with_value("numerics.output_step", max(step, case.output_step or 0.0))))
+
+
+def stability_of_two_modes() -> Measured:
+    """Return the largest |tip| of two modes on M2 at any step over the largest true one (1); growth is far above 1."""
+    largest = float(np.max(np.abs(reference_tips(_case("M2")))))
+    found = {step: float(np.max(np.abs(_two_modes(step)()))) / largest for step in (1e-1, 1e-2, 1e-3, 1e-4)}
+    worst = max(found, key=lambda step: found[step])
+    return Measured(found[worst], f"largest at {1e3 * worst:g} ms")
+
+
+def time_per_step_of_two_modes() -> Measured:
+    """Return the median time of a step of 1 ms of two modes on M2 [us]."""
+    call = _two_modes(1e-3)
+    call()
+    steps = Setting(time_step=1e-3).steps(_case("M2")) or 1
+    return Measured(MICROSECONDS * median(seconds(call) for _ in range(ROUNDS)) / steps)
+
+
+def time_of_command(*arguments: str) -> Measured:
+    """Return the median time of the process `fem-needle ...` [s], caches warm.
+
+    Raises
+    ------
+    NeedleError
+        If it fails.
+    """
+    command = [sys.executable, "-m", "fem_needle", *arguments]
+    times = []
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(PROCESS_ROUNDS + 1):
+            try:
+                times.append(seconds(lambda: subprocess.run(command, cwd=folder, capture_output=True, check=True)))
+            except subprocess.CalledProcessError as error:
+                raise NeedleError(f"the process failed: {error.stderr.decode(errors='replace')[-200:]}") from error
+    return Measured(median(times[1:]), f"{min(times[1:]):.2f} to {max(times[1:]):.2f} s")
+
+
+def batch_efficiency() -> Measured:
+    """Return the efficiency of a batch on two cores: time on one / twice the time on two [%].
+
+    Raises
+    ------
+    NeedleError
+        As long as the program has no batch.
+    """
+    simulate_many = getattr(import_module("fem_needle"), "simulate_many", None)
+    if simulate_many is None:
+        raise NeedleError("there is no simulate_many")
+    scene = _case("M").scene.with_values({"numerics.elements": 8, "numerics.time_step": 1e-2})
+    moduli = np.linspace(300.0, 800.0, BATCH)
+    scenes = [scene.with_value("tissue.layers.0.foundation_modulus", float(modulus)) for modulus in moduli]
+    simulate_many(scenes[:8])
+    one, two = (seconds(lambda cores=cores: simulate_many(scenes, cores=cores)) for cores in (1, 2))  # type: ignore[misc]
+    return Measured(100.0 * one / (2 * two), f"{BATCH} runs: {one:.3g} s on one core, {two:.3g} s on two")

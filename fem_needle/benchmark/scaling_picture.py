@@ -1,0 +1,40 @@
+"""The picture of the scaling: time of a step and memory over the elements, time of a run over its duration."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from matplotlib.axes import Axes
+
+from fem_needle.benchmark.result import ScalingRow
+from fem_needle.pictures import COLORS, MARKERS, new_figure, png_bytes, shared_style
+
+WIDTH, HEIGHT = 11.0, 3.8  # inches
+UNITS = {"per_step": 1e6, "total": 1.0, "memory": 1e-6}
+LABELS = {"per_step": "time of a step [us]", "total": "time of the run [s]", "memory": "most memory [MB]"}
+
+
+def scaling_picture(rows: tuple[ScalingRow, ...]) -> bytes:
+    """Return the picture as PNG."""
+    with shared_style():
+        figure = new_figure(WIDTH, HEIGHT)
+        left, middle, right = figure.subplots(1, 3)
+        _draw(left, rows, "elements", "per_step")
+        _draw(middle, rows, "elements", "memory")
+        _draw(right, rows, "duration", "total")
+        left.set_title("M: time of a step", loc="left")
+        middle.set_title("M, 50 steps: memory", loc="left")
+        right.set_title("M, 40 elements: time of the run", loc="left")
+        figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
+        return png_bytes(figure)
+
+
+def _draw(axes: Axes, rows: tuple[ScalingRow, ...], over: str, name: str) -> None:
+    """Draw one figure of all methods."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for index, method in enumerate(dict.fromkeys(row.method for row in rows)):
+        chosen = [row for row in rows if row.over == over and row.method == method and getattr(row, name) is not None]
+        style: dict[str, Any] = {"color": COLORS[index], "marker": MARKERS[index], "label": method}
+        axes.plot([row.size for row in chosen], [UNITS[name] * getattr(row, name) for row in chosen], **style)
+    axes.set(xlabel="elements" if over == "elements" else "duration [s]", ylabel=LABELS[name])
