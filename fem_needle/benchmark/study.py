@@ -14,7 +14,7 @@ from fem_needle.benchmark.cases import CASES, Case
 from fem_needle.benchmark.exact_methods import ExactStatics, ModesAndCosines
 from fem_needle.benchmark.library_elements import FactoredElements, NaiveElements
 from fem_needle.benchmark.machine import commit, machine
-from fem_needle.benchmark.methods import Method, Setting, Solve
+from fem_needle.benchmark.methods import RIVAL, Method, Setting, Solve
 from fem_needle.benchmark.modal_system import ModalSystem
 from fem_needle.benchmark.own_methods import AssumedModes, FixedElements, ToleranceElements
 from fem_needle.benchmark.reference import how, reference_tips
@@ -112,7 +112,9 @@ def _prepared(
             started = clock.perf_counter()
             tips = solve()
             first = clock.perf_counter() - started
-        except NeedleError as error:
+        except Exception as error:
+            if not isinstance(error, NeedleError) and method.kind != RIVAL:
+                raise
             return [*entries, _Entry(method, setting, replace(row, note=str(error)))]
         entries.append(_Entry(method, setting, replace(row, error=case.error(tips, reference)), solve, first))
     return entries
