@@ -142,7 +142,7 @@ def _two_modes(step: float) -> Callable[[], Array]:
 def stability_of_two_modes() -> Measured:
     """Return the largest |tip| of two modes on M2 at any step over the largest true one (1); growth is far above 1."""
     largest = float(np.max(np.abs(reference_tips(_case("M2")))))
-    found = {step: float(np.max(np.abs(_two_modes(step)()))) / largest for step in (1e-1, 1e-2, 1e-3, 1e-4)}
+    found = {step: float(np.max(np.abs(_two_modes(step)()))) / largest for step in (1e-1, 1e-2, 1e-3)}
     worst = max(found, key=lambda step: found[step])
     return Measured(found[worst], f"largest at {1e3 * worst:g} ms")
 

@@ -23,6 +23,7 @@ from fem_needle.benchmark.result import GoalRow, Row
 from fem_needle.errors import NeedleError
 
 MICROSECONDS = 1e6
+ORDER = 3.9  # of the two-stage collocation: 4
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,8 @@ def _loop() -> Iterator[Goal]:
         yield Goal("1", f"{case}, 40 elements: a step", 0.5, "us", lambda rows, case=case: time_per_step(case))  # type: ignore[misc]
         yield Goal("1", f"{case}, 40 elements, 0.5 ms: error", error, "1", lambda rows, case=case: error_of_loop(case))  # type: ignore[misc]
     yield Goal("1", "M, 40 elements: naive scikit-fem / this", 5000, "x", _speed_up, at_least=True)
-    yield Goal("1", "M2 with moving boundary: order in time", 1.9, "1", lambda rows: order_of_loop(), at_least=True)
+    order = "M2, boundary moving through elements: order in time (4)"
+    yield Goal("1", order, ORDER, "1", lambda rows: order_of_loop(), at_least=True)
 
 
 def _speed_up(rows: Sequence[Row]) -> Measured:
@@ -129,7 +131,7 @@ def all_goals(scenes: int) -> tuple[Goal, ...]:
         *_times_to_error(),
         Goal("3", f"tolerance kept in {scenes} random scenes", HIT_RATE, "%", lambda rows: hit_rate(scenes), at_least=True),
         Goal("3", "tolerance: cost / cheapest fixed setting", 2.0, "x", cost_of_tolerance),
-        Goal("4", "two modes, steps of 0.1 to 100 ms: tip / true tip", 1.5, "x", lambda rows: stability_of_two_modes()),
+        Goal("4", "two modes, steps of 1 to 100 ms: tip / true tip", 1.5, "x", lambda rows: stability_of_two_modes()),
         Goal("4", "two modes: a step", 0.15, "us", lambda rows: time_per_step_of_two_modes()),
         Goal("5", "process `run thesis`", 1.0, "s", lambda rows: time_of_command("run", "thesis")),
         Goal("5", "process `run thesis --no-vtk`", 0.7, "s", lambda rows: time_of_command("run", "thesis", "--no-vtk")),

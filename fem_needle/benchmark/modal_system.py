@@ -52,8 +52,8 @@ class ModalSystem(Method):
     def settings(self, case: Case) -> tuple[Setting, ...]:
         """Return modes, solver and its relative tolerance."""
         if case.name == "D":
-            pairs = [(2, 1e-4), (5, 1e-6), (10, 1e-8)]
-            return tuple(Setting(modes=n, tolerance=rtol, variant=name) for name in (DOP853, RADAU) for n, rtol in pairs)
+            pairs = [(DOP853, 2, 1e-4), (DOP853, 5, 1e-6), (DOP853, 10, 1e-8), (RADAU, 2, 1e-4), (RADAU, 5, 1e-6)]
+            return tuple(Setting(modes=n, tolerance=rtol, variant=name) for name, n, rtol in pairs)
         if case.name in ("M", "M2"):
             implicit = tuple(Setting(modes=n, tolerance=rtol, variant=RADAU) for n, rtol in ((2, 1e-3), (2, 1e-6), (4, 1e-6)))
             return (*implicit, Setting(modes=2, tolerance=1e-6, variant=DOP853))
