@@ -18,8 +18,8 @@ ERRORS = (1e-3, 1e-6)
 
 
 def last_record() -> Path:
-    """Return the file of the last kept benchmark: the last in the order of date, then of time of writing in git or on disk."""
-    return max(RESULTS.glob("*.json"), key=lambda path: (path.name[:10], path.stat().st_mtime))
+    """Return the file of the last kept benchmark."""
+    return max(RESULTS.glob("*.json"), key=lambda path: read_record(path).date)
 
 
 def figures(study: Benchmark, name: str) -> str:
@@ -29,7 +29,7 @@ def figures(study: Benchmark, name: str) -> str:
     versions = ", ".join(f"{key} {machine[key]}" for key in known)
     threads = f"{machine.get('blas_threads') or 'any number of'} BLAS threads"
     where = f"{machine.get('processor')}, {machine.get('cores')} cores, {threads}; {versions}"
-    parts = [f"From `benchmarks/results/{name}`: {study.date}, commit `{study.commit}`, {where}.\n"]
+    parts = [f"From `benchmarks/results/{name}`: {study.date[:10]}, commit `{study.commit}`, {where}.\n"]
     for error in ERRORS:
         title = f"Median time to an error of {error:.0e}; in brackets what was reached instead, and when.\n"
         parts += [title, _times(study, error)]

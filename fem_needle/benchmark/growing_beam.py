@@ -143,22 +143,23 @@ def equilibrium_start(beam: GrowingBeam, shapes: Functions) -> tuple[Array, Arra
     depth, one = beam.first_depth, np.eye(len(shapes.tip))
     bending, modulus = beam.bending_stiffness * shapes.bending, beam.foundation_modulus
     stiffness = bending / depth**3 + modulus * depth * one
-    position: Array = np.linalg.solve(stiffness, beam.tip_force(0.0) * shapes.tip)
-    rate: Array = beam.speed * np.linalg.solve(stiffness, (3 / depth**4 * bending - modulus * one) @ position)
+    position = np.asarray(np.linalg.solve(stiffness, beam.tip_force(0.0) * shapes.tip), dtype=np.float64)
+    slope = np.linalg.solve(stiffness, (3 / depth**4 * bending - modulus * one) @ position)
+    rate = np.asarray(beam.speed * slope, dtype=np.float64)
     return position, rate
 
 
-_ROOT = np.sqrt(15.0)
-_NODES = np.array([0.5 - _ROOT / 10, 0.5, 0.5 + _ROOT / 10])
-_WEIGHTS = np.array([5 / 18, 4 / 9, 5 / 18])
-_STAGES = np.array(
+_ROOT = float(np.sqrt(15.0))
+_NODES: Array = np.array([0.5 - _ROOT / 10, 0.5, 0.5 + _ROOT / 10])
+_WEIGHTS: Array = np.array([5 / 18, 4 / 9, 5 / 18])
+_STAGES: Array = np.array(
     [
         [5 / 36, 2 / 9 - _ROOT / 15, 5 / 36 - _ROOT / 30],
         [5 / 36 + _ROOT / 24, 2 / 9, 5 / 36 - _ROOT / 24],
         [5 / 36 + _ROOT / 30, 2 / 9 + _ROOT / 15, 5 / 36],
     ]
 )
-_TWICE = _STAGES @ _STAGES
+_TWICE: Array = _STAGES @ _STAGES
 
 
 def _step(beam: GrowingBeam, shapes: Functions, time: float, length: float, position: Array, rate: Array) -> tuple[Array, Array]:
@@ -172,7 +173,7 @@ def _step(beam: GrowingBeam, shapes: Functions, time: float, length: float, posi
         for other in range(3):
             columns = slice(other * size, (other + 1) * size)
             matrix[rows, columns] += length**2 * _TWICE[stage, other] * restoring + length * _STAGES[stage, other] * swept
-    pull = np.linalg.solve(matrix, right).reshape(3, size)
+    pull = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64).reshape(3, size)
     moved: Array = position + length * rate + length**2 * (_WEIGHTS @ _STAGES) @ pull
     faster: Array = rate + length * (_WEIGHTS @ pull)
     return moved, faster

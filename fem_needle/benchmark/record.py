@@ -18,7 +18,7 @@ def write_record(study: Benchmark, folder: Path) -> Path:
     ComputationError
         If it cannot be written.
     """
-    path = folder / f"{study.date}-{(study.commit or 'unknown').rstrip('+')}.json"
+    path = folder / f"{study.date[:10]}-{(study.commit or 'unknown').rstrip('+')}.json"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_atomically(path, json_bytes(study.to_dict()))

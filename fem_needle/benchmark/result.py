@@ -141,7 +141,7 @@ class Benchmark:
     limits
         What kept methods from finer settings.
     machine, commit, date
-        On what, from which version and when.
+        On what, from which version and when, as YYYY-MM-DDTHH:MM:SS+00:00.
     """
 
     cases: tuple[CaseInformation, ...]

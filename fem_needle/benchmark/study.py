@@ -94,7 +94,7 @@ def benchmark(
         limits=tuple((method.name, method.limited) for method in everyone if method.limited),
         machine=machine(rivals.packages),
         commit=commit(),
-        date=datetime.now(UTC).date().isoformat(),
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
     )
 
 
