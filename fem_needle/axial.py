@@ -3,35 +3,42 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import copysign
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fem_needle.scene import Layer, Scene
-from fem_needle.segments import tip_layer
+from fem_needle.segments import tip_values
+
+Array = NDArray[np.float64]
+FloatOrArray = TypeVar("FloatOrArray", float, NDArray[np.float64])
 
 
-def coulomb_force(scene: Scene, depth: float) -> float:
+def coulomb_force(scene: Scene, depth: FloatOrArray) -> FloatOrArray:
     """Return mu_s + mu_s' z [N]."""
     return scene.friction.coulomb + scene.friction.coulomb_per_length * depth
 
 
-def viscous_coefficient(scene: Scene, depth: float) -> float:
+def viscous_coefficient(scene: Scene, depth: FloatOrArray) -> FloatOrArray:
     """Return mu_v + mu_v' z [N s/m]."""
     return scene.friction.viscous + scene.friction.viscous_per_length * depth
 
 
-def friction_force(scene: Scene, depth: float, speed: float) -> float:
+def friction_force(scene: Scene, depth: FloatOrArray, speed: FloatOrArray) -> FloatOrArray:
     """Return sign(v) (mu_s + mu_s' z) + (mu_v + mu_v' z) v [N]; 0 at rest, where friction takes what it must."""
-    if speed == 0.0:
-        return 0.0
-    return copysign(coulomb_force(scene, depth), speed) + viscous_coefficient(scene, depth) * speed
+    return np.sign(speed) * coulomb_force(scene, depth) + viscous_coefficient(scene, depth) * speed
 
 
 def cutting_force(scene: Scene, depth: float, speed: float, deepest: float) -> float:
     """Return the cutting force [N] of the layer at the tip: only while the tip advances into uncut tissue."""
-    if speed <= 0.0 or depth < deepest:
-        return 0.0
-    layer = tip_layer(scene.tissue.layers, depth)
-    return 0.0 if layer is None else scene.tissue.layers[layer].cutting_force
+    return float(cutting_forces(scene, np.array([depth]), np.array([speed]), np.array([deepest]))[0])
+
+
+def cutting_forces(scene: Scene, depths: Array, speeds: Array, deepest: Array) -> Array:
+    """Return the same at many instants (T,)."""
+    advances = (speeds > 0.0) & (depths >= deepest)
+    return np.where(advances, tip_values(scene.tissue.layers, depths, lambda layer: layer.cutting_force), 0.0)
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.beam_matrices import Beam
+from fem_needle.beam_table import matrix_table, point_rows, rate_table
 from fem_needle.foundation import Foundation
 from fem_needle.frames import Frame
 from fem_needle.loads import turns_with_needle
 from fem_needle.path import CutPath
-from fem_needle.plant import Operators, Points, RestTerms
+from fem_needle.plant import SMALLEST_COMPLIANCE, Operators, Points, RestTerms
 from fem_needle.scene import Guide, LateralLoad, Scene, as_function
 from fem_needle.shapes import Shapes
+from fem_needle.tables import OperatorTable, PointTable
 
 Array = NDArray[np.float64]
 
@@ -44,6 +46,7 @@ class BeamNeedle(ABC):
     axial_force_acts = True
     largest_spectral_radius = 1.0
     warnings: tuple[str, ...] = ()
+    has_table = True
 
     def __init__(self, scene: Scene, shapes: Shapes, frame: Frame, beam: Beam) -> None:
         self.scene = scene
@@ -121,7 +124,8 @@ class BeamNeedle(ABC):
         if self.turns:
             rows[-2, 1] = 1.0
         guides = self.scene.support.guides
-        return Points(rows, rates, *self._flexibility(depth, count), len(guides), _compliances(guides))
+        flexibility, rate = self._flexibilities(np.array([depth]), count)
+        return Points(rows, rates, flexibility[0], rate[0], len(guides), _compliances(guides))
 
     def deflection(self, coordinates: Array, forces: Array, depth: float, arc_length: Array, derivative: int = 0) -> Array:
         """Return w [m] or a derivative of it by arc length at stations from the hub (0) to the tip (l)."""
@@ -135,13 +139,29 @@ class BeamNeedle(ABC):
             result[inside] = self.shapes.evaluate(coordinates, places, derivative) / stretch**derivative
         return result
 
+    def table(self, depths: Array) -> OperatorTable:
+        """Return the plant at many depths [m] (T,) as arrays."""
+        first, rows, rates = point_rows(self.foundation, self.point_positions, self.turns, depths)
+        guides, needle = self.scene.support.guides, self.scene.needle
+        points = PointTable(
+            first,
+            rows,
+            rates,
+            *self._flexibilities(depths, first.shape[1]),
+            len(guides),
+            _compliances(guides),
+            SMALLEST_COMPLIANCE * needle.length**3 / (48 * needle.bending_stiffness),
+        )
+        beam = self._beam
+        return OperatorTable(matrix_table(beam, self.foundation, depths), rate_table(beam, self.foundation, depths), points)
+
     @abstractmethod
     def describe(self) -> dict[str, int | float | str]:
         """Return what ``summary.json`` says of the model."""
 
-    def _flexibility(self, depth: float, count: int) -> tuple[Array, Array]:
-        """Return B and dB/dz (count, count): what the shapes miss of a point force, nothing by default."""
-        return np.zeros((count, count)), np.zeros((count, count))
+    def _flexibilities(self, depths: Array, count: int) -> tuple[Array, Array]:
+        """Return B and dB/dz (T, count, count) over depths (T,): what the shapes miss of a point force, nothing by default."""
+        return np.zeros((len(depths), count, count)), np.zeros((len(depths), count, count))
 
 
 def points_of(scene: Scene) -> tuple[Guide | LateralLoad, ...]:

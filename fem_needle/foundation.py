@@ -35,20 +35,22 @@ class Foundation:
         The functions w is made of, and where y lies on them.
     tip_stiffness
         Spring that travels with the tip [N/m].
+    mass, drag, slip
+        Derived: the integrals of the shapes' products; the last two of a viscous tissue past which the shapes move.
     """
 
     layers: tuple[Layer, ...]
     shapes: Shapes
     frame: Frame
     tip_stiffness: float = 0.0
-    _mass: IntervalIntegrals = field(init=False)
-    _drag: IntervalIntegrals = field(init=False)
-    _slip: IntervalIntegrals = field(init=False)
+    mass: IntervalIntegrals = field(init=False)
+    drag: IntervalIntegrals = field(init=False)
+    slip: IntervalIntegrals = field(init=False)
 
     def __post_init__(self) -> None:
         kinds: tuple[Kind, ...] = ("mass", "drag", "slip") if self.is_damped and self.frame.power is not None else ("mass",)
         for kind in kinds:
-            object.__setattr__(self, f"_{kind}", self.shapes.interval_integrals(kind, self.frame.power or 0))
+            object.__setattr__(self, kind, self.shapes.interval_integrals(kind, self.frame.power or 0))
 
     @property
     def is_damped(self) -> bool:
@@ -58,12 +60,12 @@ class Foundation:
     def unit_stiffness(self, layer: int, depth: float) -> Array:
         """Return F_i(z) [m] of one layer, band storage: the derivative of the tissue matrix by that layer's modulus."""
         unit = tuple(1.0 if index == layer else 0.0 for index in range(len(self.layers)))
-        return self._sum(self._mass, unit, depth, self.frame.stretch(depth))
+        return self._sum(self.mass, unit, depth, self.frame.stretch(depth))
 
     def stiffness(self, depth: float) -> Array:
         """Return G(z) = sum k_i F_i(z)."""
         moduli = tuple(layer.foundation_modulus for layer in self.layers)
-        band = self._sum(self._mass, moduli, depth, self.frame.stretch(depth))
+        band = self._sum(self.mass, moduli, depth, self.frame.stretch(depth))
         if self.tip_stiffness:
             banded.add_square(band, self._tip_row(depth), self.tip_stiffness)
         return band
@@ -77,7 +79,7 @@ class Foundation:
         result = self._tip_rate_product(coordinates, depth)
         if frame.stretch_rate:
             moduli = tuple(layer.foundation_modulus for layer in self.layers)
-            layers = self._sum(self._mass, moduli, depth, frame.stretch_rate)
+            layers = self._sum(self.mass, moduli, depth, frame.stretch_rate)
             result += banded.multiply(layers, coordinates)
         for segment in inserted_segments(self.layers, depth):
             modulus = self.layers[segment.layer].foundation_modulus * frame.stretch(depth)
@@ -140,13 +142,13 @@ class Foundation:
             return None, None, None
         viscosities = tuple(layer.damping for layer in self.layers)
         stretch = self.frame.stretch(depth)
-        resisting = self._sum(self._mass, viscosities, depth, stretch)
+        resisting = self._sum(self.mass, viscosities, depth, stretch)
         if self.frame.power is None:
             return resisting, None, None
         return (
             resisting,
-            self._sum(self._drag, viscosities, depth, -1.0),
-            self._sum(self._slip, viscosities, depth, 1.0 / stretch),
+            self._sum(self.drag, viscosities, depth, -1.0),
+            self._sum(self.slip, viscosities, depth, 1.0 / stretch),
         )
 
     def _sum(

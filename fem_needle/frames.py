@@ -7,12 +7,13 @@ depth fraction xi = y / z (physics: docs/theory.md, sections "Hub" and "Entry").
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Depth = TypeVar("Depth", float, Array)
 
 
 class Frame(Protocol):
@@ -27,7 +28,10 @@ class Frame(Protocol):
     def positions(self, y: Array, depth: float) -> tuple[Array, Array]:
         """Return the places of points on the needle, the tip excluded, and their rates by depth."""
 
-    def stretch(self, depth: float) -> float:
+    def places_of(self, y: Array | float, depths: Array) -> tuple[Array, Array]:
+        """Return the places of points at y [m], and their rates by depth, over many depths [m]: `position`, `position_rate`."""
+
+    def stretch(self, depth: Depth) -> Depth | float:
         """Return dy / d(position)."""
 
     def axis_positions(self, places: Array, depth: float) -> Array:
@@ -64,11 +68,17 @@ class MaterialFrame:
         """Return -1, or 0 at the tip, which moves with the mesh."""
         return 0.0 if y >= depth else -1.0
 
+    def places_of(self, y: Array | float, depths: Array) -> tuple[Array, Array]:
+        """Return s and -1, or l and 0 at the tip."""
+        at_tip = y >= depths
+        places = np.clip(y + (self.length - depths), 0.0, self.length)
+        return np.where(at_tip, self.length, places), np.where(at_tip, 0.0, -1.0)
+
     def positions(self, y: Array, depth: float) -> tuple[Array, Array]:
         """Return s and -1."""
         return y + (self.length - depth), np.full(y.shape, -1.0)
 
-    def stretch(self, depth: float) -> float:
+    def stretch(self, depth: Depth) -> Depth | float:
         """Return 1."""
         return 1.0
 
@@ -96,11 +106,16 @@ class StretchedFrame:
         """Return -xi / z, or 0 at the tip."""
         return 0.0 if y >= depth else -y / depth**2
 
+    def places_of(self, y: Array | float, depths: Array) -> tuple[Array, Array]:
+        """Return xi and -xi / z, or 1 and 0 at the tip."""
+        at_tip = y >= depths
+        return np.where(at_tip, 1.0, np.maximum(y / depths, 0.0)), np.where(at_tip, 0.0, -y / depths**2)
+
     def positions(self, y: Array, depth: float) -> tuple[Array, Array]:
         """Return xi and -xi / z."""
         return y / depth, -y / depth**2
 
-    def stretch(self, depth: float) -> float:
+    def stretch(self, depth: Depth) -> Depth | float:
         """Return z [m]."""
         return depth
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import pi
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.scene import LateralLoad, Scene, Sinusoid, TimeFunction, TipLoad, as_function
-from fem_needle.segments import tip_layer
+from fem_needle.segments import tip_values
 
 Array = NDArray[np.float64]
+FloatOrArray = TypeVar("FloatOrArray", float, Array)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +36,10 @@ class LoadCase:
     clamp_accelerations: Array
 
 
-def second_derivative(function: TimeFunction, time: float) -> float:
+def second_derivative(function: TimeFunction, time: FloatOrArray) -> FloatOrArray:
     """Return the second derivative of a time function from the right, without the jumps of its slope."""
     if not isinstance(function, Sinusoid):
-        return 0.0
+        return 0.0 * time
     return -((2 * pi * function.frequency) ** 2) * (function.value(time) - function.mean)
 
 
@@ -56,35 +58,37 @@ def is_steady(scene: Scene) -> bool:
 
 def load_case(scene: Scene, depth: float, time: float) -> LoadCase:
     """Return the loads at a depth [m] (the bevel law asks for the layer at the tip) and time [s]."""
+    cases = load_cases(scene, np.array([depth]), np.array([time]))
+    return LoadCase(*(getattr(cases, part.name)[0] for part in fields(LoadCase)))
+
+
+def load_cases(scene: Scene, depths: Array, times: Array) -> LoadCase:
+    """Return the loads at many depths [m] and times [s] (T,): every array has a row for each."""
     known = [as_function(load.force) for load in scene.loads if isinstance(load, LateralLoad)]
     if turns_with_needle(scene):
         known.append(as_function(scene.support.hub_torque))
-    forces = [function.value(time) for function in known]
-    rates = [function.derivative(time) for function in known]
-    tip, tip_rate = _tip_force(scene, depth, time)
+    tip, tip_rate = _tip_forces(scene, depths, times)
     clamp = [as_function(scene.support.hub_deflection), as_function(scene.support.hub_angle)]
     return LoadCase(
-        np.array([*forces, tip]),
-        np.array([*rates, tip_rate]),
-        np.array([function.value(time) for function in clamp]),
-        np.array([function.derivative(time) for function in clamp]),
-        np.array([second_derivative(function, time) for function in clamp]),
+        np.stack([*(function.value(times) for function in known), tip], axis=1),
+        np.stack([*(function.derivative(times) for function in known), tip_rate], axis=1),
+        np.stack([function.value(times) for function in clamp], axis=1),
+        np.stack([function.derivative(times) for function in clamp], axis=1),
+        np.stack([second_derivative(function, times) for function in clamp], axis=1),
     )
 
 
-def _tip_force(scene: Scene, depth: float, time: float) -> tuple[float, float]:
+def _tip_forces(scene: Scene, depths: Array, times: Array) -> tuple[Array, Array]:
     """Sum the tip loads; the bevel law is F = a k(y) m(t) with the modulus at the tip."""
-    total = rate = 0.0
-    layer = tip_layer(scene.tissue.layers, depth)
-    modulus = 0.0 if layer is None else scene.tissue.layers[layer].foundation_modulus
+    total, rate = np.zeros_like(times), np.zeros_like(times)
     factor = as_function(scene.tissue.stiffness_factor)
     for load in scene.loads:
         if not isinstance(load, TipLoad):
             continue
         if load.bevel_coefficient is None:
             force = as_function(0.0 if load.force is None else load.force)
-            total, rate = total + force.value(time), rate + force.derivative(time)
+            total, rate = total + force.value(times), rate + force.derivative(times)
         else:
-            scale = load.bevel_coefficient * modulus
-            total, rate = total + scale * factor.value(time), rate + scale * factor.derivative(time)
-    return float(total), float(rate)
+            scale = load.bevel_coefficient * tip_values(scene.tissue.layers, depths, lambda layer: layer.foundation_modulus)
+            total, rate = total + scale * factor.value(times), rate + scale * factor.derivative(times)
+    return total, rate

@@ -17,6 +17,7 @@ from fem_needle.ledger import StepEnd, Works, energies, force_jump_work, jump_wo
 from fem_needle.motion import DepthLaw, depth_law, landing_times, run_duration
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample, sample_step
+from fem_needle.scene import Scene
 from fem_needle.stages import trivial_solution
 from fem_needle.steppers import Step, Stepper
 
@@ -101,7 +102,7 @@ def march(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample, N
         times[-1] = end
         for time, until in pairwise(times.tolist()):
             if time in landings:
-                state, work = _pass_landing(plant, stepper, law, state, time, until)
+                state, work = pass_landing(plant, stepper, law, state, time, until)
                 works = works if time == 0.0 else works + work
             step = _advance(plant, stepper, law, state, until, last)
             if time == 0.0:
@@ -112,11 +113,15 @@ def march(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample, N
         if end in outputs:
             shown = works + row_correction(step, inertia=inertia, at_start=False)
             yield sample_step(plant, step, shown, deepest, law.depth(end), at_start=False, inertia=inertia)
-    ends_by_itself = plant.scene.run.duration is None and plant.scene.insertion.final_depth is not None
-    return RunEnd("final-depth" if ends_by_itself else "duration", grid.steps)
+    return RunEnd("final-depth" if ends_by_itself(plant.scene) else "duration", grid.steps)
 
 
-def _pass_landing(
+def ends_by_itself(scene: Scene) -> bool:
+    """Return whether a position-driven run ends where its insertion does."""
+    return scene.run.duration is None and scene.insertion.final_depth is not None
+
+
+def pass_landing(
     plant: Plant, stepper: Stepper, law: DepthLaw, before: StepEnd, time: float, until: float
 ) -> tuple[StepEnd, Works]:
     """Return the state just after a kink and what the kink did; a needle that leaves the tissue leaves its energy."""
@@ -134,13 +139,14 @@ def _advance(plant: Plant, stepper: Stepper, law: DepthLaw, state: StepEnd, unti
     try:
         step = stepper.advance(law, state, until, last)
     except (SingularMatrixError, np.linalg.LinAlgError, FloatingPointError) as error:
-        raise _failed(time, law.depth(time), str(error)) from error
+        raise failed_step(time, law.depth(time), str(error)) from error
     if not np.all(np.isfinite(step.ends[1].solution.coordinates)):
-        raise _failed(time, law.depth(time), "the deflection is not finite")
+        raise failed_step(time, law.depth(time), "the deflection is not finite")
     return step
 
 
-def _failed(time: float, depth: float, what: str) -> ComputationError:
+def failed_step(time: float, depth: float, what: str) -> ComputationError:
+    """Return the error of a step from a time [s] and depth [m] that failed."""
     return ComputationError(
         f"the step at time {time:g} s, depth {depth:g} m failed: {what}; use a smaller time_step, or fewer elements"
     )

@@ -8,12 +8,16 @@ from itertools import pairwise
 from math import inf, nextafter
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from fem_needle.loads import second_derivative
 from fem_needle.rigid_push import time_to_depth
 from fem_needle.scene import LateralLoad, Scene, Sinusoid, Table, TimeFunction, TipLoad, as_function
 from fem_needle.segments import interfaces
+
+Array = NDArray[np.float64]
 
 PUSH_SLACK = 5.0
 
@@ -61,12 +65,17 @@ class DepthLaw:
 
     def depth(self, time: float) -> float:
         """Return z(t) [m]."""
+        return float(self.depths(np.asarray(time)))
+
+    def depths(self, times: Array) -> Array:
+        """Return z at many times [m]."""
         insertion = self.scene.insertion
         if insertion.kind == "profile":
-            return float(self._source.value(time))
-        if time >= self.rests_from and insertion.final_depth is not None:
-            return insertion.final_depth
-        return self._unstopped(time)
+            return self._source.value(times)
+        if insertion.kind in {"hold", "force"}:
+            return np.full(times.shape, insertion.first_depth)
+        moving = insertion.first_depth + self._source.integral(times)
+        return moving if insertion.final_depth is None else np.where(times >= self.rests_from, insertion.final_depth, moving)
 
     def layer_depth(self, start: float, end: float) -> float:
         """Return the depth in the middle of a step [m]."""
@@ -74,21 +83,28 @@ class DepthLaw:
 
     def speed(self, time: float) -> float:
         """Return dz/dt from the right [m/s]."""
+        return float(self.speeds(np.asarray(time)))
+
+    def speeds(self, times: Array) -> Array:
+        """Return dz/dt from the right at many times [m/s]."""
         insertion = self.scene.insertion
         if insertion.kind == "profile":
-            return float(self._source.derivative(time))
-        if insertion.kind in {"hold", "force"} or time >= self.rests_from:
-            return 0.0
-        return float(self._source.value(time))
+            return self._source.derivative(times)
+        if insertion.kind in {"hold", "force"}:
+            return np.zeros(times.shape)
+        return np.where(times >= self.rests_from, 0.0, self._source.value(times))
+
+    def accelerations(self, times: Array) -> Array:
+        """Return the second derivative of z from the right at many times, without the jumps of speed [m/s^2]."""
+        insertion = self.scene.insertion
+        if insertion.kind in {"hold", "force"}:
+            return np.zeros(times.shape)
+        rate = self._source.derivative(times) if insertion.kind == "speed" else second_derivative(self._source, times)
+        return np.where(times >= self.rests_from, 0.0, rate)
 
     def acceleration(self, time: float) -> float:
-        """Return the second derivative of z from the right, without the jumps of speed [m/s^2]."""
-        insertion = self.scene.insertion
-        if insertion.kind in {"hold", "force"} or time >= self.rests_from:
-            return 0.0
-        if insertion.kind == "speed":
-            return float(self._source.derivative(time))
-        return second_derivative(self._source, time)
+        """Return the same at one time [m/s^2]."""
+        return float(self.accelerations(np.asarray(time)))
 
     def after(self, time: float) -> Instant:
         """Return the motion just after a time."""
@@ -131,12 +147,6 @@ class DepthLaw:
         insertion = self.scene.insertion
         source = insertion.depth if insertion.kind == "profile" else insertion.speed
         return as_function(0.0 if source is None else source)
-
-    def _unstopped(self, time: float) -> float:
-        insertion = self.scene.insertion
-        if insertion.kind in {"hold", "force"}:
-            return insertion.first_depth
-        return insertion.first_depth + float(self._source.integral(time))
 
     def _monotone_pieces(self, duration: float) -> list[float]:
         """Times between which the depth rises or falls throughout."""

@@ -73,17 +73,18 @@ class FiniteElementNeedle(BeamNeedle):
         """Return kind, number of elements and degree."""
         return {"model": "fem", "elements": self.mesh.elements, "degree": self.mesh.degree}
 
-    def _flexibility(self, depth: float, count: int) -> tuple[Array, Array]:
-        """Return B and dB/dz: points in one element bend it beyond its own shapes."""
-        flexibility, rate = np.zeros((count, count)), np.zeros((count, count))
-        places = [self.mesh.locate(self.frame.position(point.position, depth)) for point in self._point_list]
+    def _flexibilities(self, depths: Array, count: int) -> tuple[Array, Array]:
+        """Return B and dB/dz over depths: points in one element bend it beyond its own shapes."""
+        flexibility, rate = np.zeros((len(depths), count, count)), np.zeros((len(depths), count, count))
+        places = [self.mesh.locate_all(self.frame.places_of(point.position, depths)[0]) for point in self._point_list]
+        degree = self.mesh.degree
         for first, (element, place) in enumerate(places):
+            scale = np.asarray(self.mesh.lengths[element] ** 3 / self.scene.needle.bending_stiffness)
             for second, (other, other_place) in enumerate(places):
-                if element == other:
-                    scale, degree = self._kink_scale(element), self.mesh.degree
-                    flexibility[first, second] = scale * kink_compliance(place, other_place, degree)
-                    moved = -kink_shift_rate(place, other_place, degree) / self.mesh.lengths[element]
-                    rate[first, second] = scale * moved
+                same = scale * (element == other)
+                flexibility[:, first, second] = same * kink_compliance(place, other_place, degree)
+                moved = -kink_shift_rate(place, other_place, degree) / self.mesh.lengths[element]
+                rate[:, first, second] = same * moved
         return flexibility, rate
 
     def _kink_scale(self, element: int) -> float:

@@ -22,8 +22,11 @@ from numpy.typing import NDArray
 from fem_needle import banded
 from fem_needle.path import CutPath
 from fem_needle.scene import Scene
+from fem_needle.tables import OperatorTable
 
 Array = NDArray[np.float64]
+
+SMALLEST_COMPLIANCE = 1e-9  # of the needle's own: a guide's kink below it is taken as at a node
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +163,8 @@ class Plant(Protocol):
         Of the integrator of a moving needle: below 1 where vibrations that a step does not resolve would grow.
     warnings
         What a user should know of the model before trusting it.
+    has_table
+        Whether it gives its matrices at many depths at once, which the compiled loop needs.
     """
 
     scene: Scene
@@ -170,12 +175,16 @@ class Plant(Protocol):
     axial_force_acts: bool
     largest_spectral_radius: float
     warnings: tuple[str, ...]
+    has_table: bool
 
     def operators(self, depth: float, time: float) -> Operators:
         """Return the matrices."""
 
     def points(self, depth: float) -> Points:
         """Return where point forces act."""
+
+    def table(self, depths: Array) -> OperatorTable:
+        """Return matrices, points and rates over many depths [m] (T,) for the compiled loop, of a plant that ``has_table``."""
 
     def clamp_reactions(self, residual: Array, depth: float) -> tuple[float, float]:
         """Return force [N] and moment [N m] of the clamp from what the coordinates' equations lack; zeros without a clamp."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import copysign
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fem_needle.scene import Layer
+
+Array = NDArray[np.float64]
 
 ROUNDINGS = 1e-12  # of a depth: what a landing on an interface may miss it by
 
@@ -45,10 +49,16 @@ def one_sided(layers: Sequence[Layer], depth: float, toward: float) -> float:
 
     Rates by depth jump there: a layer that begins or ends has none yet, or none any more, on the other side.
     """
-    slack = ROUNDINGS * max(abs(depth), abs(toward))
-    if depth == toward or all(abs(depth - level) > slack for level in interfaces(layers)):
-        return depth
-    return depth + copysign(min(2 * slack, abs(toward - depth)), toward - depth)
+    return float(all_one_sided(layers, np.array([depth]), np.array([toward]))[0])
+
+
+def all_one_sided(layers: Sequence[Layer], depths: Array, toward: Array) -> Array:
+    """Return the same for many depths [m] (T,)."""
+    slack = ROUNDINGS * np.maximum(np.abs(depths), np.abs(toward))
+    near = np.zeros(depths.shape, dtype=bool)
+    for level in interfaces(layers):
+        near |= np.abs(depths - level) <= slack
+    return np.where(near, depths + np.copysign(np.minimum(2 * slack, np.abs(toward - depths)), toward - depths), depths)
 
 
 def tip_layer(layers: Sequence[Layer], depth: float) -> int | None:
@@ -57,6 +67,14 @@ def tip_layer(layers: Sequence[Layer], depth: float) -> int | None:
         if layer.holds(depth):
             return index
     return None
+
+
+def tip_values(layers: Sequence[Layer], depths: Array, value: Callable[[Layer], float]) -> Array:
+    """Return a value of the layer that holds each of many tips y = ``depths`` [m] (T,), as `tip_layer`; 0 in empty space."""
+    result = np.zeros_like(depths)
+    for layer in reversed(layers):
+        result = np.where((depths >= layer.start) & (depths < layer.far_side), value(layer), result)
+    return result
 
 
 def interfaces(layers: Sequence[Layer]) -> tuple[float, ...]:

@@ -5,12 +5,16 @@ w = sum_i psi_i(x) q_i, with x a place on the line of the shapes (`frames` says 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.table_terms import Term
+
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Kind = Literal["mass", "drag", "slip", "bending"]
 
 
@@ -26,6 +30,9 @@ class IntervalIntegrals(Protocol):
 
     def add(self, start: float, end: float, factor: float, target: Array) -> None:
         """Add ``factor`` times the integral from ``start`` to ``end`` to a band matrix, in place."""
+
+    def terms(self, kind: int, starts: Array, ends: Array, factors: Array) -> Iterator[Term]:
+        """Yield the same over many intervals (T,) as terms of a kind of matrix (`fem_needle.tables`)."""
 
 
 class Shapes(Protocol):
@@ -47,8 +54,15 @@ class Shapes(Protocol):
     def quadrature_points(self) -> int:
         """Number of Gauss points on each piece between breaks."""
 
+    @property
+    def stride(self) -> int:
+        """Coordinates from one element's first to the next one's; of shapes without elements, any number."""
+
     def row(self, position: float, derivative: int = 0) -> Array:
         """Return the row (size,) that maps coordinates to the value, or a derivative, at a place."""
+
+    def rows(self, positions: Array, derivative: int = 0) -> tuple[Integers, Array]:
+        """Return the same at many places (T,): first coordinates (T,) and what differs from zero from there on (T, m)."""
 
     def weighted_sum(self, positions: Array, weights: Array, derivative: int = 0) -> Array:
         """Return the sum over places of weight times shape, or derivative of it, for every coordinate (size,)."""

@@ -17,7 +17,7 @@ from fem_needle.ledger import StepEnd, StepParts
 from fem_needle.loads import LoadCase, is_steady, load_case
 from fem_needle.motion import Instant, Motion
 from fem_needle.path import CutPath
-from fem_needle.plant import Operators, Plant
+from fem_needle.plant import SMALLEST_COMPLIANCE, Operators, Plant
 from fem_needle.segments import ROUNDINGS, one_sided
 from fem_needle.stages import (
     PathHistory,
@@ -36,7 +36,6 @@ from fem_needle.statics import static_state
 
 Array = NDArray[np.float64]
 
-SMALLEST_COMPLIANCE = 1e-9  # of the needle's own: a guide's kink below it is taken as at a node
 JUMP_FRACTION = 1e-9  # of a step: in this time viscosity lets nothing move
 MOST_PATH_ITERATIONS = 50
 PATH_TOLERANCE = 1e-13  # of the largest tip deflection of the step

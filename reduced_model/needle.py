@@ -93,6 +93,7 @@ class AssumedModeNeedle(BeamNeedle):
         self.corrections = shapes.size - count - 2
         grown = shapes.size - 2 if isinstance(frame, FixedFrame) else 0
         self.nearly_dependent = grown > INDEPENDENT_MODES
+        self.has_table = not self.nearly_dependent and scene.model.variant != "as-printed"
         self.axial_force_acts = scene.model.variant == "conservative"
         self.warnings = (*variant_warnings(scene), *correction_warnings(scene))
         if self.nearly_dependent or any(guide.stiffness == "rigid" for guide in scene.support.guides):

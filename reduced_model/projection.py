@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fem_needle import FiniteElementNeedle, banded
 from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Points, RestTerms
+from fem_needle.tables import OperatorTable
 from reduced_model.bases import Basis
 from reduced_model.needle import INDEPENDENT_MODES, STABLE_SPECTRAL_RADIUS, resolved_directions
 
@@ -38,6 +39,7 @@ class ProjectedNeedle:
     """
 
     axial_force_acts = True
+    has_table = False
 
     def __init__(self, needle: FiniteElementNeedle, basis: Basis) -> None:
         self.needle = needle
@@ -89,6 +91,10 @@ class ProjectedNeedle:
             rates = rates + points.rows @ self._columns(depth, 1)
         none = np.zeros_like(points.flexibility)
         return Points(points.rows @ columns, rates, none, none, points.guides, points.guide_compliance)
+
+    def table(self, depths: Array) -> OperatorTable:
+        """Refuse: its columns may move with the depth in any way."""
+        raise NotImplementedError("columns may move with the depth in any way")
 
     def clamp_reactions(self, residual: Array, depth: float) -> tuple[float, float]:
         """Return force [N] and moment [N m] of the clamp."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from fem_needle import banded
 from fem_needle.gauss import gauss_rule
 from fem_needle.shapes import Kind
+from fem_needle.table_terms import Block, Term
 from reduced_model.modes import ClampedFreeModes
 
 Array = NDArray[np.float64]
 
 GAUSS_POINTS = 16
 KEPT = 16  # values at recent places
+_ORDERS = {"mass": (0, 0), "drag": (0, 1), "slip": (1, 1), "bending": (2, 2)}  # derivatives of the two factors
 WAVES_PER_PANEL = 1.0  # of the shortest mode: its square is integrated to rounding by 16 points
 
 
@@ -132,6 +134,15 @@ class LineShapes:
         points, _ = gauss_rule(GAUSS_POINTS)
         return _unwritable(self.values(start + (end - start) * points, derivative))
 
+    @property
+    def stride(self) -> int:
+        """No elements: the number of functions."""
+        return self.size
+
+    def rows(self, positions: Array, derivative: int = 0) -> tuple[NDArray[np.int64], Array]:
+        """Return rows at many places: first coordinates (T,), all 0, and values (T, size)."""
+        return np.zeros(len(positions), dtype=np.int64), np.ascontiguousarray(self.values(positions, derivative).T)
+
     def weighted_sum(self, positions: Array, weights: Array, derivative: int = 0) -> Array:
         """Return the sum over places of weight times function (size,)."""
         return self.values(positions, derivative) @ weights
@@ -193,15 +204,38 @@ class GaussIntegrals:
             result = result + self._part(float(breaks[last]), end)
         return result
 
+    def terms(self, kind: int, starts: Array, ends: Array, factors: Array) -> Iterator[Term]:
+        """Yield the same over many intervals (T,) as one dense block."""
+        entries = factors[:, None, None] * (self._upto(ends) - self._upto(starts))
+        yield Block(kind, np.zeros(len(starts), dtype=np.int64), entries)
+
+    def _upto(self, ends: Array) -> Array:
+        """Return the integrals (T, size, size) from the line's start."""
+        breaks = self.shapes.breaks
+        panel = np.clip(np.searchsorted(breaks, ends, side="right") - 1, 0, len(breaks) - 2)
+        points, weights = gauss_rule(GAUSS_POINTS)
+        starts = breaks[panel]
+        sizes = ends - starts
+        places = starts[:, None] + sizes[:, None] * points
+        left, right = (
+            self.shapes.values(places.ravel(), order).reshape(-1, *places.shape) for order in _ORDERS[self.kind]
+        )
+        scaled = sizes[:, None] * weights * (places + self.shapes.offset) ** self._exponent
+        part = np.einsum("itg,tg,jtg->tij", left, scaled, right, optimize=True)
+        whole = np.concatenate([np.zeros((1, *self.panels.shape[1:])), np.cumsum(self.panels, axis=0)])
+        return np.asarray(whole[panel] + part, dtype=float)
+
+    @property
+    def _exponent(self) -> int:
+        return self.power * {"drag": 1, "slip": 2}.get(self.kind, 0)
+
     def _part(self, start: float, end: float) -> Array:
         points, weights = gauss_rule(GAUSS_POINTS)
         values = self.shapes.gauss_values
-        orders = {"mass": (0, 0), "drag": (0, 1), "slip": (1, 1), "bending": (2, 2)}[self.kind]
-        left, right = (values(start, end, order) for order in orders)
+        left, right = (values(start, end, order) for order in _ORDERS[self.kind])
         weights = weights * (end - start)
-        exponent = self.power * {"drag": 1, "slip": 2}.get(self.kind, 0)
-        if exponent:
-            weights = weights * (start + (end - start) * points + self.shapes.offset) ** exponent
+        if self._exponent:
+            weights = weights * (start + (end - start) * points + self.shapes.offset) ** self._exponent
         return np.asarray((left * weights) @ right.T, dtype=float)
 
 

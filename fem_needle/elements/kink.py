@@ -27,25 +27,25 @@ def kink(place: Array | float, force_place: float, degree: int, derivative: int 
     return shape
 
 
-def kink_compliance(first: float, second: float, degree: int) -> float:
+def kink_compliance(first: Array, second: Array, degree: int) -> Array:
     """Return g(first, second), the deflection (1) at one place under a unit force at another."""
-    x, a = min(first, second), max(first, second)
+    x, a = np.minimum(first, second), np.maximum(first, second)
     compliance = (1 - a) ** 2 * x**2 * (3 * a - x - 2 * a * x) / 6
     if degree == 4:
         compliance -= 256 * (x * (1 - x) * a * (1 - a)) ** 2 / BUBBLE_ENERGY
-    return compliance
+    return np.asarray(compliance)
 
 
-def kink_shift_rate(first: float, second: float, degree: int) -> float:
+def kink_shift_rate(first: Array, second: Array, degree: int) -> Array:
     """Return how g(first, second) changes when both places move together, per unit place."""
-    x, a = min(first, second), max(first, second)
+    x, a = np.minimum(first, second), np.maximum(first, second)
     by_x = (1 - a) ** 2 * x * (2 * a - x - 2 * a * x) / 2
     by_a = x**2 * (1 - a) * ((1 - a) * (3 - 2 * x) - 2 * (3 * a - x - 2 * a * x)) / 6
     rate = by_x + by_a
     if degree == 4:
         moved = (1 - 2 * x) * a * (1 - a) + (1 - 2 * a) * x * (1 - x)
         rate -= 512 * x * (1 - x) * a * (1 - a) * moved / BUBBLE_ENERGY
-    return rate
+    return np.asarray(rate)
 
 
 def _left_part(x: Array, a: float, derivative: int) -> Array:

@@ -59,6 +59,11 @@ class LineMesh:
         place = (position - self.nodes[element]) / self.lengths[element]
         return element, min(max(float(place), 0.0), 1.0)
 
+    def locate_all(self, positions: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return elements and places of many positions (T,)."""
+        elements = np.clip(np.searchsorted(self.nodes, positions, side="right") - 1, 0, self.elements - 1)
+        return elements, np.clip((positions - self.nodes[elements]) / self.lengths[elements], 0.0, 1.0)
+
     def row(self, position: float, derivative: int = 0) -> Array:
         """Return the row (size,) that maps coordinates to the value, or a derivative, at a position."""
         element, place = self.locate(position)
@@ -67,10 +72,21 @@ class LineMesh:
         row[first : first + self.reference.count] = self.shapes_in(element, place, derivative)
         return row
 
-    def shapes_in(self, element: int, place: Array | float, derivative: int = 0) -> Array:
-        """Return the shapes (count, ...) of one element, or a derivative by position, at places 0..1."""
+    @property
+    def stride(self) -> int:
+        """Coordinates from one element's first to the next one's."""
+        return self.reference.stride
+
+    def rows(self, positions: Array, derivative: int = 0) -> tuple[NDArray[np.int64], Array]:
+        """Return rows at many places: first coordinates (T,) and the values of one element's shapes (T, m)."""
+        columns, shapes = self._shapes_at(positions, derivative)
+        return np.ascontiguousarray(columns[0]), np.ascontiguousarray(shapes.T)
+
+    def shapes_in(self, element: int | NDArray[np.int64], place: Array | float, derivative: int = 0) -> Array:
+        """Return the shapes (count, ...) of one element, or of as many as places have rows, or a derivative, at places 0..1."""
         values = self.reference.unit_shapes(place, derivative)
-        return (values.T * (self.scales[element] / self.lengths[element] ** derivative)).T
+        scale = self.scales[element].T / self.lengths[element] ** derivative
+        return values * scale.reshape(scale.shape + (1,) * (values.ndim - scale.ndim))
 
     def weighted_sum(self, positions: Array, weights: Array, derivative: int = 0) -> Array:
         """Return the sum over positions of weight times shape, or derivative of it, for every coordinate (size,)."""
@@ -84,10 +100,7 @@ class LineMesh:
 
     def _shapes_at(self, positions: Array, derivative: int) -> tuple[NDArray[np.int64], Array]:
         """Return the coordinates (count, positions) that act at each position, and their shapes there."""
-        where = np.searchsorted(self.nodes, positions, side="right") - 1
-        where = np.clip(where, 0, self.elements - 1)
-        size = self.lengths[where]
-        place = np.clip((positions - self.nodes[where]) / size, 0.0, 1.0)
-        shapes = self.reference.unit_shapes(place, derivative) * self.scales[where].T / size**derivative
+        where, place = self.locate_all(positions)
+        shapes = self.shapes_in(where, place, derivative)
         columns = self.reference.stride * where + np.arange(self.reference.count)[:, None]
         return np.asarray(columns, dtype=np.int64), shapes

@@ -85,7 +85,7 @@ class ReferenceElement:
         powers = np.ones((coefficients.shape[1], *x.shape))
         for exponent in range(1, len(powers)):
             powers[exponent] = powers[exponent - 1] * x
-        return coefficients @ powers
+        return np.tensordot(coefficients, powers, axes=1)
 
     def slope_scale(self, length: Array | float) -> Array:
         """Return the factor (count, ...) that turns unit-element slopes into slopes by position."""

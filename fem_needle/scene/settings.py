@@ -149,6 +149,8 @@ class Numerics(Part):
         Time between samples [s] or ``"auto"``.
     output_points
         Stations along the needle.
+    loop
+        Over the time steps: ``"compiled"`` (numba), ``"numpy"``, or ``"auto"``: compiled where it can be and pays.
     """
 
     elements: Annotated[
@@ -163,6 +165,7 @@ class Numerics(Part):
     spectral_radius: Annotated[float, Quantity(at_least=0.0, at_most=1.0)] = 1.0
     output_step: Annotated[float | Literal["auto"], _STEP] = "auto"
     output_points: Annotated[int, Quantity(at_least=2, at_most=100_001, integer=True)] = 101
+    loop: Literal["auto", "compiled", "numpy"] = "auto"
 
     @model_validator(mode="after")
     def _check(self) -> Self:

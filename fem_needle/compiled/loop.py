@@ -1,0 +1,245 @@
+"""The compiled loop over steps of the collocation methods (equations: `fem_needle.stages`).
+
+A stage's equations, with operators that hold speed and swelling (`OPERATORS`): E0 = K + m G + v D - v^2 R, E1 = C - v S^T,
+E2 = v S and M,
+
+    P = M q' + E2 q,   P' = -E0 q - E1 q' + N.forces.
+
+Unknown are the increments of the free coordinates at both stages, the second stage's first: in that order every leading part of
+the matrix is regular for all the methods of `fem_needle.collocation`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fem_needle.compiled.bands import ENTRANCE, INNER, add_product, factor, solve, solve_dense
+
+OPERATORS = 4
+MASS, POSITION, VELOCITY, TRANSPORT = range(OPERATORS)  # M, E0, E1, E2
+
+
+@njit(**INNER)
+def _assemble(bases, local, stride, sums, ranges, range_scale, range_ends, blocks, block, operators):
+    """Add up the operators (4, 2 b + 1, n) of an instant: multiples of bases, ranges of elements of bases, small blocks.
+
+    ``sums`` (4, bases): multiples. ``ranges``: operator and base of each range; ``blocks``: operator and first coordinate.
+    """
+    count, rows = local.shape[2], operators.shape[1]
+    for operator in range(OPERATORS):
+        for row in range(rows):
+            target = operators[operator, row]
+            target[:] = 0.0
+            for base in range(bases.shape[0]):
+                scale = sums[operator, base]
+                if scale != 0.0:
+                    source = bases[base, row]
+                    for column in range(len(target)):
+                        target[column] += scale * source[column]
+    for number in range(ranges.shape[0]):
+        base, scale = ranges[number, 1], range_scale[number]
+        for element in range(range_ends[number, 0], range_ends[number, 1]):
+            for row in range(count):
+                for column in range(count):
+                    entry = scale * local[base, element, row, column]
+                    operators[ranges[number, 0], rows // 2 + row - column, stride * element + column] += entry
+    for number in range(blocks.shape[0]):
+        first = blocks[number, 1]
+        for row in range(block.shape[1]):
+            for column in range(block.shape[1]):
+                entry = block[number, row, column]
+                operators[blocks[number, 0], rows // 2 + row - column, first + column] += entry
+
+
+@njit(**INNER)
+def _fill_matrix(operators, inverse, length, clamped, rows):
+    """Fill the matrix of a step from the operators (2, 4, 2 b + 1, n) at its stages."""
+    middle, size = operators.shape[2] // 2, operators.shape[3]
+    width = 2 * middle + 1
+    rows[:, :] = 0.0
+    for stage in range(2):
+        for other in range(2):
+            slope = inverse[stage, other] / length
+            first = inverse[stage, 0] * inverse[0, other] / (length * length)
+            second = inverse[stage, 1] * inverse[1, other] / (length * length)
+            for row in range(width):
+                shift = row - middle
+                start, stop = max(clamped, clamped - shift), min(size, size - shift)
+                diagonal = width - 2 * shift + stage - other
+                for column in range(start, stop):
+                    entry = first * operators[0, MASS, row, column] + second * operators[1, MASS, row, column]
+                    entry += slope * (operators[stage, VELOCITY, row, column] + operators[other, TRANSPORT, row, column])
+                    if stage == other:
+                        entry += operators[stage, POSITION, row, column]
+                    rows[2 * (column + shift - clamped) + 1 - stage, diagonal] = entry
+
+
+@njit(**INNER)
+def _fill_right_side(operators, inverse, length, clamp, state, known, side, answer):
+    """Fill the right-hand side with what the increments do not change; returns the stages' coordinates without them in ``known``.
+
+    The clamp moves as ``clamp`` says (stage, deflection and angle or their rates, two numbers), the rest stays.
+    """
+    size, clamped = state.shape[1], clamp.shape[2]
+    for stage in range(2):
+        for index in range(size):
+            known[stage, index], side[stage, index] = state[0, index], 0.0
+        for index in range(clamped):
+            known[stage, index] = clamp[stage, 0, index]
+    rates = known[2]
+    for stage in range(2):
+        add_product(operators[stage, POSITION], -1.0, known[stage], side[stage])
+        moves = False
+        rates[:] = 0.0
+        for index in range(clamped):
+            rates[index] = clamp[stage, 1, index]
+            moves = moves or rates[index] != 0.0
+        if moves:
+            add_product(operators[stage, VELOCITY], -1.0, rates, side[stage])
+        for other in range(2):
+            slope = inverse[other, stage] / length
+            add_product(operators[stage, TRANSPORT], -slope, known[stage], side[other])
+            if moves:
+                add_product(operators[stage, MASS], -slope, rates, side[other])
+            for index in range(size):
+                side[other, index] += slope * state[1, index]
+    for stage in range(2):
+        for index in range(size - clamped):
+            answer[2 * index + 1 - stage] += side[stage, clamped + index]
+
+
+@njit(**INNER)
+def _add_forces(rows, firsts, forces, clamped, stage, answer):
+    """Add forces at points, whose rows (points, m) begin at the coordinates ``firsts``, to a stage's right-hand side."""
+    for point in range(len(forces)):
+        for column in range(rows.shape[1]):
+            index = firsts[point] + column - clamped
+            if index >= 0:
+                answer[2 * index + 1 - stage] += forces[point] * rows[point, column]
+
+
+@njit(**INNER)
+def _hold_guides(first, matrix, rows, firsts, compliance, gaps, known, clamped, columns, answers, dense, answer):
+    """Add the guides' forces, which come out in ``gaps`` (2 guides,): N q + B P + compliance R = 0 at both stages."""
+    guides, width = compliance.shape[1], rows.shape[2]
+    columns[:, :] = 0.0
+    for number in range(2 * guides):
+        stage, guide = number // guides, number % guides
+        for column in range(width):
+            index, entry = firsts[first + stage, guide] + column, rows[first + stage, guide, column]
+            gaps[number] -= entry * known[stage, index]
+            if index >= clamped:
+                columns[number, 2 * (index - clamped) + 1 - stage] = entry
+        for index in range(len(answer)):
+            answers[number, index] = columns[number, index]
+        solve(matrix, matrix.shape[1] // 2, answers[number])
+        for index in range(len(answer)):
+            gaps[number] -= columns[number, index] * answer[index]
+    for number in range(2 * guides):
+        for other in range(2 * guides):
+            entry, stage = 0.0, number // guides
+            if stage == other // guides:
+                entry = compliance[first + stage, number % guides, other % guides]
+            for index in range(len(answer)):
+                entry += columns[number, index] * answers[other, index]
+            dense[number, other] = entry
+    solve_dense(dense, gaps)
+    for number in range(2 * guides):
+        for index in range(len(answer)):
+            answer[index] += gaps[number] * answers[number, index]
+
+
+@njit(**INNER)
+def _finish(operators, inverse, length, end_shares, clamp_rates, known, answer, stages, end, state):
+    """Set the stages (2, n) and the state at the end, coordinates and momentum (2, n), from the increments."""
+    size, clamped = state.shape[1], clamp_rates.shape[1]
+    rates, momentum = known[2], known[3]
+    for index in range(size):
+        end[0, index], end[1, index] = state[0, index], state[1, index]
+    for stage in range(2):
+        rates[:] = 0.0
+        momentum[:] = 0.0
+        for index in range(clamped):
+            rates[index] = clamp_rates[stage, index]
+        for index in range(size - clamped):
+            early, late = answer[2 * index + 1], answer[2 * index]
+            rates[clamped + index] = (inverse[stage, 0] * early + inverse[stage, 1] * late) / length
+            known[stage, clamped + index] += late if stage else early
+        add_product(operators[stage, MASS], 1.0, rates, momentum)
+        add_product(operators[stage, TRANSPORT], 1.0, known[stage], momentum)
+        share, total = end_shares[stage], 0.0
+        for index in range(size):
+            stages[stage, index] = known[stage, index]
+            end[0, index] += share * (known[stage, index] - state[0, index])
+            end[1, index] += share * (momentum[index] - state[1, index])
+            total += end[0, index]
+    return np.isfinite(total)
+
+
+@njit(**INNER)
+def _copy(source, target):
+    for row in range(source.shape[0]):
+        for column in range(source.shape[1]):
+            target[row, column] = source[row, column]
+
+
+@njit(**ENTRANCE)
+def run_steps(terms, points, course, scheme, state, kept, work):
+    """Go through all steps; returns how many were done, fewer where the next one's equations have no finite answer.
+
+    Parameters
+    ----------
+    terms
+        Bases (bases, 2 b + 1, n), their element matrices (bases, elements, m, m), stride; at the nodes (2 steps,): sums, ranges
+        (operator and base), range_scale, range_ends, blocks (operator and first coordinate), block; see `_assemble`.
+    points
+        Rows (2 steps, points, m), first coordinates, and for the guides: compliance (2 steps, guides, guides) and gaps that known
+        forces open (2 steps, guides).
+    course
+        Lengths of the steps, loads (2 steps, loads), clamp (2 steps, 2, clamped), clamp at the ends (steps, clamped), and the row
+        of ``kept`` that receives each step, -1: none.
+    scheme
+        A^-1 (2, 2) and b A^-1 (2,).
+    state
+        Coordinates and momentum (2, n), at the start and, afterwards, at the end of the last step done.
+    kept
+        Coordinates at the stages (kept, 2, n), end state (kept, 2, n), guides' forces (kept, 2, guides).
+    work
+        Operators (2, 4, 2 b + 1, n), matrix (2 free, 4 b + 3), known (4, n), side (2, n), answer (2 free,), end (2, n), stages
+        (2, n), columns and answers (2 guides, 2 free), dense (2 guides, 2 guides), gaps (2 guides,).
+    """
+    bases, local, stride, sums, ranges, range_scale, range_ends, blocks, block = terms
+    rows, firsts, compliance, opened = points
+    lengths, loads, clamp, end_clamp, target = course
+    inverse, end_shares = scheme
+    kept_stages, kept_ends, kept_forces = kept
+    operators, matrix, known, side, answer, end, stages, columns, answers, dense, gaps = work
+    guides, clamped = compliance.shape[1], end_clamp.shape[1]
+    for step in range(len(lengths)):
+        length, first = lengths[step], 2 * step
+        answer[:] = 0.0
+        for stage in range(2):
+            at, part = first + stage, operators[stage]
+            _assemble(bases, local, stride, sums[at], ranges, range_scale[at], range_ends[at], blocks[at], block[at], part)
+            _add_forces(rows[at, guides:], firsts[at, guides:], loads[at], clamped, stage, answer)
+        _fill_matrix(operators, inverse, length, clamped, matrix)
+        _fill_right_side(operators, inverse, length, clamp[first : first + 2], state, known, side, answer)
+        if not factor(matrix, matrix.shape[1] // 2):
+            return step
+        solve(matrix, matrix.shape[1] // 2, answer)
+        for number in range(2 * guides):
+            gaps[number] = -opened[first + number // guides, number % guides]
+        if guides:
+            _hold_guides(first, matrix, rows, firsts, compliance, gaps, known, clamped, columns, answers, dense, answer)
+        rates = clamp[first : first + 2, 1]
+        if not _finish(operators, inverse, length, end_shares, rates, known, answer, stages, end, state):
+            return step
+        for index in range(clamped):
+            end[0, index] = end_clamp[step, index]
+        if target[step] >= 0:
+            _copy(stages, kept_stages[target[step]])
+            _copy(end, kept_ends[target[step]])
+            _copy(gaps.reshape((2, guides)), kept_forces[target[step]])
+        _copy(end, state)
+    return len(lengths)
