@@ -23,6 +23,7 @@ from fem_needle.statics import solve_static
 Array = NDArray[np.float64]
 
 PILOT_INSTANTS = 7
+SLOW_PERIODS = 10  # longest natural periods: loads that swing faster are taken to make the needle vibrate
 HISTORY_POINTS = 400
 OUTPUTS = 200
 STEPS_PER_PERIOD = 16
@@ -43,37 +44,54 @@ class Choice:
         What is left out and why.
     inertia_error
         Bound on what leaving inertia out costs the tip, relative to its largest deflection.
+    vibration
+        How far inertia moves the tip at most, relative to its largest deflection; 1 where that was not looked at.
     """
 
     analysis: str
     output_step: float
     skipped: tuple[Skipped, ...]
     inertia_error: float
+    vibration: float = 1.0
 
 
 def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
     """Return analysis, output step and what is skipped; ``pilot`` makes a coarse plant, where one is needed."""
     numerics = scene.numerics
     duration = run_duration(scene)
-    slack = PUSH_SLACK if scene.run.duration is None and scene.insertion.kind == "force" else 1.0
-    step = numerics.output_step if isinstance(numerics.output_step, float) else duration / slack / OUTPUTS
+    step = numerics.output_step if isinstance(numerics.output_step, float) else likely_duration(scene) / OUTPUTS
     if step > duration:
         raise SceneError(f"numerics.output_step: longer than the run (got {step:g}; allowed up to {duration:g} s)")
-    analysis, skipped, effect = numerics.analysis, tuple(unneeded_terms(scene)), 0.0
+    analysis, skipped, effect, leaves_out = numerics.analysis, tuple(unneeded_terms(scene)), 1.0, False
     if analysis == "auto" and scene.insertion.kind == "force":
         analysis = "dynamic"
+    elif analysis == "dynamic" and _chooses_steps(scene):
+        coarse = pilot()
+        effect = 1.0 if shortest_period(scene) < SLOW_PERIODS * longest_period(coarse) else inertia_effect(coarse)
     if analysis == "auto":
         effect = inertia_effect(pilot())
         allowed = INERTIA_SHARE * numerics.tolerance
         analysis = "quasi-static" if effect <= allowed else "dynamic"
-        if analysis == "quasi-static":
+        leaves_out = analysis == "quasi-static"
+        if leaves_out:
             reason = f"moves the tip by at most {effect:.1e} of its largest deflection (allowed {allowed:.1e})"
             skipped = (Skipped("inertia", reason), *skipped)
     elif analysis != "dynamic":
         skipped = (Skipped("inertia", f"analysis = '{analysis}' was asked for"), *skipped)
     if analysis == "dynamic" and numerics.time_step == "auto" and needs_no_steps(scene):
         skipped = (*skipped, Skipped("time steps", "held, undamped, under constant loads: eigenvectors once, then cosines"))
-    return Choice(analysis, step, skipped, effect if analysis == "quasi-static" else 0.0)
+    return Choice(analysis, step, skipped, effect if leaves_out else 0.0, min(effect, 1.0))
+
+
+def likely_duration(scene: Scene) -> float:
+    """Return how long the run will last [s]; of a push that ends by itself, what a rigid needle would take."""
+    slack = PUSH_SLACK if scene.run.duration is None and scene.insertion.kind == "force" else 1.0
+    return run_duration(scene) / slack
+
+
+def _chooses_steps(scene: Scene) -> bool:
+    """Return whether automatic time steps want to know how far the needle of a given motion may vibrate."""
+    return scene.numerics.time_step == "auto" and scene.insertion.kind != "force" and not needs_no_steps(scene)
 
 
 def tip_difference(scene: Scene, plant: Plant, finer: Plant, analysis: str = "static") -> float:
@@ -89,9 +107,9 @@ def tip_difference(scene: Scene, plant: Plant, finer: Plant, analysis: str = "st
     return float(np.max(np.abs(coarse - fine))) / scale
 
 
-def tip_differences(scene: Scene, plant: Plant, finer: Plant) -> Array:
+def tip_differences(scene: Scene, plant: Plant, finer: Plant, count: int = PILOT_INSTANTS) -> Array:
     """Return the differences at each of the `instants`."""
-    coarse, fine = static_tips(plant), static_tips(finer)
+    coarse, fine = static_tips(plant, count), static_tips(finer, count)
     scale = max(float(np.max(np.abs(fine))), scene.numerics.absolute_tolerance)
     return np.abs(coarse - fine) / scale
 
@@ -101,23 +119,27 @@ def first_time_step(plant: Plant, analysis: str, output_step: float) -> float:
     step = min(output_step, shortest_period(plant.scene) / POINTS_PER_PERIOD)
     if analysis != "dynamic":
         return step
-    frequencies = [natural_frequencies(plant, depth, time)[0] for time, depth in instants(plant)]
-    return min(step, 2 * pi / min(frequencies) / STEPS_PER_PERIOD)
+    return min(step, longest_period(plant) / STEPS_PER_PERIOD)
 
 
-def static_tips(plant: Plant) -> Array:
+def longest_period(plant: Plant) -> float:
+    """Return the longest natural period [s] over the run."""
+    return 2 * pi / min(natural_frequencies(plant, depth, time)[0] for time, depth in instants(plant))
+
+
+def static_tips(plant: Plant, count: int = PILOT_INSTANTS) -> Array:
     """Return the static tip deflections [m] at the `instants`."""
-    return np.array([solve_static(plant, depth=depth, time=time).tip_deflection for time, depth in instants(plant)])
+    return np.array([solve_static(plant, depth=depth, time=time).tip_deflection for time, depth in instants(plant, count)])
 
 
-def instants(plant: Plant) -> list[tuple[float, float]]:
+def instants(plant: Plant, count: int = PILOT_INSTANTS) -> list[tuple[float, float]]:
     """Return (time, depth) spread over the run; what is hardly inserted yet is left out."""
     scene, law = plant.scene, depth_law(plant.scene)
-    times = np.linspace(0.0, run_duration(scene), PILOT_INSTANTS).tolist()
+    times = np.linspace(0.0, run_duration(scene), count).tolist()
     found = [(time, law.depth(time)) for time in times]
     if scene.insertion.kind == "force":  # the depths over time are not known yet: spread them
         last = scene.insertion.final_depth or run_limits(scene).contact
-        depths = np.linspace(scene.insertion.first_depth, last, PILOT_INSTANTS + 1)[:-1].tolist()
+        depths = np.linspace(scene.insertion.first_depth, last, count + 1)[:-1].tolist()
         found = list(zip(times, depths, strict=True))
     shallow = SHALLOW * scene.needle.length if scene.support.kind == "entry" else 0.0
     return [(time, max(depth, shallow)) for time, depth in found]

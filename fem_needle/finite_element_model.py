@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
-from fem_needle.choices import tip_difference
+from fem_needle.choices import instants, static_tips, tip_difference, tip_differences
 from fem_needle.errors import SceneError
+from fem_needle.modal_stepper import needs_no_steps
 from fem_needle.models import ChosenPlant
 from fem_needle.needle import FiniteElementNeedle
 from fem_needle.plant import Plant
+from fem_needle.rounding import round_off
 from fem_needle.scene import Scene
 
-ELEMENT_CHOICES = (8, 12, 16, 24, 32, 48, 64, 96, 128)
-FEWEST_DYNAMIC_ELEMENTS = 16
+ELEMENT_CHOICES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 ELEMENT_SHARE = 0.1  # of the tolerance: what the mesh may cost
+MESH_INSTANTS = 12
+VIBRATING = 4.0 / 3.0  # the error of a free vibration over the difference from twice as many elements: its order is 2 or more
 PILOT_ELEMENTS = 8
+GROWN = 2.0  # an error that two finer meshes make larger by this factor is round-off
 
 
 class FiniteElementModel:
@@ -30,52 +36,110 @@ class FiniteElementModel:
         return FiniteElementNeedle(scene, elements=None if numerics.elements == "auto" else int(numerics.elements))
 
     def choose(self, scene: Scene, analysis: str) -> ChosenPlant:
-        """Return the needle on the mesh or with the elements that the scene gives or, on "auto", needs."""
-        return choose_mesh(scene, analysis)
+        """Return the needle on the mesh or with the elements that the scene gives or, on "auto", needs.
+
+        The error is relative to the largest tip deflection; None where there is nothing finer to compare with.
+        """
+        meshes = Meshes(scene, analysis)
+        if scene.numerics.mesh is None and scene.numerics.elements == "auto":
+            return meshes.chosen()
+        plant = _given_mesh(scene, 1)
+        try:
+            finer = _given_mesh(scene, 2)
+        except SceneError:  # more elements than are allowed, or smaller ones
+            return ChosenPlant(plant, None)
+        return ChosenPlant(plant, meshes.between(plant, finer))
 
 
 FAMILY = FiniteElementModel()
 
 
-def choose_elements(scene: Scene, analysis: str) -> tuple[int, float]:
-    """Return the fewest elements whose tips agree with twice as many, and the difference that remains.
+@dataclass(frozen=True)
+class Meshes:
+    """What meshes of equal elements cost the tip of a scene.
 
-    Compared at rest at instants spread over the run, or over time where the needle is held and vibrates freely; relative to the
-    largest tip deflection among them.
+    Attributes
+    ----------
+    scene, analysis
+        As in `FiniteElementModel.choose`.
     """
-    fewest = FEWEST_DYNAMIC_ELEMENTS if analysis == "dynamic" else ELEMENT_CHOICES[0]
-    allowed = ELEMENT_SHARE * scene.numerics.tolerance
-    candidates = [count for count in ELEMENT_CHOICES if count >= fewest]
-    error = np.inf
-    for count in candidates:
-        error = mesh_error(scene, FiniteElementNeedle(scene, elements=count), 2 * count, analysis)
-        if error <= allowed:
-            return count, error
-    return candidates[-1], error
+
+    scene: Scene
+    analysis: str
+    _needles: dict[int, FiniteElementNeedle] = field(default_factory=dict)
+    _errors: dict[int, float] = field(default_factory=dict)
+
+    def error(self, elements: int) -> float:
+        """Return the difference of the tip from that of twice as many elements, relative to the largest tip deflection."""
+        if elements not in self._errors:
+            self._errors[elements] = self.between(self.needle(elements), self.needle(2 * elements))
+        return self._errors[elements]
+
+    def needle(self, elements: int) -> FiniteElementNeedle:
+        """Return the needle with so many elements."""
+        if elements not in self._needles:
+            self._needles[elements] = FiniteElementNeedle(self.scene, elements=elements)
+        return self._needles[elements]
+
+    def between(self, plant: Plant, finer: Plant) -> float:
+        """Return how far two needles' tips differ, relative to the largest tip deflection.
+
+        At rest at instants spread over the run; over time where the needle is held and vibrates freely.
+        """
+        if self.analysis == "dynamic" and needs_no_steps(self.scene):
+            return VIBRATING * tip_difference(self.scene, plant, finer, self.analysis)
+        return float(np.max(tip_differences(self.scene, plant, finer, MESH_INSTANTS)))
+
+    def fewest(self, allowed: float) -> int:
+        """Return the fewest elements whose error is allowed; where none is, those with the smallest error."""
+        errors = []
+        for count in ELEMENT_CHOICES:
+            errors.append(self.error(count))
+            if errors[-1] <= allowed:
+                return count
+            if len(errors) > 2 and min(errors[-2:]) > GROWN * min(errors):  # round-off grows with the elements
+                break
+        return ELEMENT_CHOICES[int(np.argmin(errors))]
+
+    def chosen(self) -> ChosenPlant:
+        """Return the needle with the fewest elements that the tips at rest allow."""
+        return self.choice(self.needle(self.fewest(ELEMENT_SHARE * self.scene.numerics.tolerance)), 0.0)
+
+    def finer(self, plant: Plant, factor: float) -> FiniteElementNeedle | None:
+        """Return the needle with ``factor`` times the elements of a plant and more than it has; None beyond the finest."""
+        present = int(plant.describe()["elements"])
+        counts = [count for count in ELEMENT_CHOICES if count > present and count >= factor * present]
+        return self.needle(counts[0]) if counts else None
+
+    def choice(self, plant: Plant, error: float) -> ChosenPlant:
+        """Return the choice of one of the needles, whose error in motion is known, relative to the largest tip deflection."""
+        count, tolerance = int(plant.describe()["elements"]), self.scene.numerics.tolerance
+        error = max(error, self.error(count))
+        missed = f"the tolerance {tolerance:g} was not reached with {count} elements: see error_estimate"
+        warnings = (missed,) if error > tolerance else ()
+        return ChosenPlant(self.needle(count), error, warnings, round_off=self.round_off(count), ladder=self)
+
+    def round_off(self, count: int) -> float:
+        """Return what rounding costs the largest tip deflection: at rest, or all of an error that more elements make larger."""
+        finer = [error for other, error in self._errors.items() if other > count]
+        if len(finer) > 1 and min(finer) > GROWN * self.error(count):
+            return self.error(count)
+        plant = self.needle(count)
+        places, tips = instants(plant, MESH_INSTANTS), np.abs(static_tips(plant, MESH_INSTANTS))
+        time, depth = places[int(np.argmax(tips))]
+        return round_off(plant, depth, time)
+
+
+def choose_elements(scene: Scene, analysis: str) -> tuple[int, float]:
+    """Return the fewest elements whose tips agree with twice as many, and the difference that remains."""
+    meshes = Meshes(scene, analysis)
+    count = meshes.fewest(ELEMENT_SHARE * scene.numerics.tolerance)
+    return count, meshes.error(count)
 
 
 def mesh_error(scene: Scene, plant: Plant, finer: int, analysis: str = "static") -> float:
     """Return the largest difference of tips from those on a finer mesh, relative to the largest tip."""
     return tip_difference(scene, plant, FiniteElementNeedle(scene, elements=finer), analysis)
-
-
-def choose_mesh(scene: Scene, analysis: str) -> ChosenPlant:
-    """Return the needle on the mesh or with the elements that the scene gives or, on "auto", needs, and what that may cost.
-
-    The error is relative to the largest tip deflection; None where there is nothing finer to compare with.
-    """
-    numerics = scene.numerics
-    if numerics.mesh is None and numerics.elements == "auto":
-        count, error = choose_elements(scene, analysis)
-        missed = f"the tolerance {numerics.tolerance:g} was not reached with {count} elements: see error_estimate"
-        warnings = (missed,) if error > numerics.tolerance else ()
-        return ChosenPlant(FiniteElementNeedle(scene, elements=count), error, warnings)
-    plant = _given_mesh(scene, 1)
-    try:
-        finer = _given_mesh(scene, 2)
-    except SceneError:  # more elements than are allowed, or smaller ones
-        return ChosenPlant(plant, None)
-    return ChosenPlant(plant, tip_difference(scene, plant, finer, analysis))
 
 
 def _given_mesh(scene: Scene, parts: int) -> FiniteElementNeedle:

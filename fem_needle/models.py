@@ -13,6 +13,16 @@ from fem_needle.scene import Scene
 ENTRY_POINTS = "fem_needle.models"
 
 
+class Ladder(Protocol):
+    """Models of one scene from coarse to fine."""
+
+    def finer(self, plant: Plant, factor: float) -> Plant | None:
+        """Return the first model with ``factor`` times the unknowns of a plant and more than it; None beyond the finest."""
+
+    def choice(self, plant: Plant, error: float) -> ChosenPlant:
+        """Return the choice of one of them, whose error in motion is known, relative to the largest tip deflection."""
+
+
 @dataclass(frozen=True, eq=False)
 class ChosenPlant:
     """A plant for a run.
@@ -25,11 +35,17 @@ class ChosenPlant:
         What its discretization may cost the tip, relative to the largest deflection; None where nothing finer was compared.
     warnings
         What a user should know before trusting it.
+    round_off
+        What rounding costs one answer of the tip, relative to itself.
+    ladder
+        Finer and coarser models of the same scene; None: there are none.
     """
 
     plant: Plant
     error: float | None
     warnings: tuple[str, ...] = ()
+    round_off: float = 0.0
+    ladder: Ladder | None = None
 
 
 class ModelFamily(Protocol):

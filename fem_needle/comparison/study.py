@@ -29,6 +29,7 @@ from fem_needle.statics import solve_static
 Array = NDArray[np.float64]
 
 WITHIN = 0.01
+FEWEST_ELEMENTS, FEWEST_DYNAMIC_ELEMENTS = 8, 16  # of a reference: shapes and frequencies are compared too, not the tip alone
 REFERENCE_SHARE = 1e-2  # of the smaller of tolerance and error of the ranges: tolerance of the reference's mesh
 SMALLEST_TOLERANCE = 1e-10
 DEFAULT_DEPTHS = 3
@@ -156,8 +157,13 @@ def _reference(scene: Scene, dynamic: bool, within: float) -> tuple[Scene, Stati
     scene = scene.with_values({"numerics.analysis": choice.analysis, "numerics.output_step": choice.output_step})
     finest = max(REFERENCE_SHARE * min(within, scene.numerics.tolerance), SMALLEST_TOLERANCE)
     load = static_load(family.pilot(scene))
-    chosen = family.choose(load.applied(scene).with_value("numerics.tolerance", finest), choice.analysis)
+    loaded = load.applied(scene).with_value("numerics.tolerance", finest)
+    chosen = family.choose(loaded, choice.analysis)
     elements = chosen.plant.describe().get("elements")
+    fewest = FEWEST_DYNAMIC_ELEMENTS if choice.analysis == "dynamic" else FEWEST_ELEMENTS
+    if elements is not None and int(elements) < fewest and scene.numerics.elements == "auto" and scene.numerics.mesh is None:
+        elements = fewest
+        chosen = family.choose(loaded.with_value("numerics.elements", elements), choice.analysis)
     if elements is not None and scene.numerics.mesh is None:
         scene = scene.with_value("numerics.elements", elements)
     return scene, load, chosen.error

@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 
 from fem_needle.choices import choose, first_time_step
 from fem_needle.errors import SceneError
-from fem_needle.loads import is_steady, load_case
+from fem_needle.loads import is_steady
 from fem_needle.models import model_family
 from fem_needle.motion import depth_law, run_duration
 from fem_needle.plant import Plant
+from fem_needle.rounding import round_off
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
 from fem_needle.simulation import simulate
 from fem_needle.skipping import inertia_free_stepper
-from fem_needle.statics import solve_static, static_state
+from fem_needle.statics import solve_static
 from fem_needle.steppers import StaticStepper
 
 Array = NDArray[np.float64]
@@ -32,8 +33,6 @@ PATHS = {"elements": "numerics.elements", "time-step": "numerics.time_step", "mo
 STATIC_INSTANTS = 21  # equilibria over a run that moves
 FIXED_STEP_SHARE = 0.125  # of the automatic first step: the step that is held fixed
 ROUND_OFF_INSTANTS = 7
-_NUDGES = (1, 2, 3, 5, 8, 13)  # units in which the depth is moved to see the round-off
-_NUDGE = 2.0**-50
 
 
 @dataclass(frozen=True)
@@ -195,32 +194,12 @@ def size_of(plant: Plant) -> tuple[str, int]:
     return next(((key, int(description[key])) for key in ("modes", "elements") if key in description), ("", 0))
 
 
-def round_off(plant: Plant, depth: float, time: float) -> float:
-    """Return the largest relative change of the tip's answer to a tip force as the depth moves by a few last digits.
-
-    The true change is as small as the digits; what shows is the round-off of forming and solving the equations.
-    """
-    if depth < 2.0 * plant.smallest_depth:
-        return 0.0
-    found = [_tip_compliance(plant, depth * (1.0 - nudge * _NUDGE), time) for nudge in (0, *_NUDGES)]
-    return max(abs(value - found[0]) for value in found) / abs(found[0])
-
-
 def _largest_round_off(scene: Scene, plant: Plant, times: Array, tips: Array) -> float:
     """Return the largest round-off among some instants, each by the share of its tip in the largest."""
     law, largest = depth_law(scene), float(np.max(np.abs(tips))) or 1.0
     chosen = np.unique(np.linspace(0, len(times) - 1, ROUND_OFF_INSTANTS).astype(int)).tolist()
     found = [abs(tips[row]) / largest * round_off(plant, law.depth(times[row]), times[row]) for row in chosen]
     return float(max(found))
-
-
-def _tip_compliance(plant: Plant, depth: float, time: float) -> float:
-    """Return the tip's deflection under a tip force of 1 N and nothing else [m]."""
-    operators, points, case = plant.operators(depth, time), plant.points(depth), load_case(plant.scene, depth, time)
-    forces = np.zeros_like(case.forces)
-    forces[-1] = 1.0
-    alone = replace(case, forces=forces, clamp=np.zeros_like(case.clamp))
-    return float(points.rows[-1] @ static_state(plant, operators, points, alone, depth=depth, time=time)[0])
 
 
 def _is_series_of_equilibria(scene: Scene, plant: Plant) -> bool:

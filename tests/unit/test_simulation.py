@@ -132,7 +132,7 @@ def test_final_depth_is_the_reason_where_the_scene_ends_by_itself():
 
 
 def test_a_tolerance_that_is_not_reached_is_told(monkeypatch):
-    monkeypatch.setattr("fem_needle.simulation.MOST_HALVINGS", 1)
+    monkeypatch.setattr("fem_needle.refined_run.MOST_RUNS", 3)
     scene = scene_of("entry", held(0.1), GEL, [TipLoad(force=Sinusoid(amplitude=0.1, frequency=40.0))], duration=0.02)
     run = simulate(plant(scene), analysis="dynamic", output_step=0.01, time_step="auto", tolerance=1e-10)
     assert len(run.summary["warnings"]) == 1

@@ -1,0 +1,382 @@
+"""Runs whose mesh and time step follow from the tolerance: a few cheap trial runs, a final run, an error estimate from them.
+
+Trial runs with long steps tell how much the mesh costs in motion and, by their differences, with which order the error falls and
+which step is needed; the next run takes it. Derivation: docs/theory.md, "What may be left out" and what follows it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import ceil, floor, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from fem_needle.choices import likely_duration, longest_period
+from fem_needle.errors import ComputationError
+from fem_needle.march import RunEnd, TimeGrid, time_grid
+from fem_needle.motion import shortest_period
+from fem_needle.run_job import Job, begin, collect, shown, stepper_of, total_error, trajectory_of
+from fem_needle.samples import Sample
+from fem_needle.steppers import DynamicStepper
+from fem_needle.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+FEWEST_STEPS = 25  # of the coarsest trial run
+FEWEST_SAMPLES = 50  # of a finer run: instants at which runs are compared
+STEPS_PER_LOAD_PERIOD = 4  # of the coarsest trial run
+STEPS_PER_NATURAL_PERIOD = 1.5  # likewise, where vibrations matter
+MOST_RUNS = 14
+MOST_STEPS = 4_000_000
+MOST_MESHES = 6
+MOST_FAILURES = 5
+AIM = 0.8  # of the allowed error
+LEAST_TIME_SHARE = 0.5  # of the tolerance
+MESH_SHARE = 0.3  # of the tolerance: what the mesh may cost in motion
+VIBRATION_SHARE = 0.5  # of the tolerance: smaller vibrations need not be resolved
+TIME_ORDER = 4.0  # of the integrator with a spectral radius of 1, otherwise 3
+FIRST = 0.75  # of the method's order: what is hoped for before one is observed
+SMALLEST_ORDER = 0.5
+SAFETY = 1.5  # of an error that follows from an observed order
+MESH_SAFETY = 1.25  # of a difference from a finer mesh
+LEAST_FINER = 1.5  # times as many elements: a mesh to compare with
+MESH_ORDER = 5.0  # of the mesh's error in motion, to guess the elements that are needed
+FINAL_RATIO = 0.4  # of the last step: a shorter final step first gets a trial run of its own
+BEFORE_FINAL = 2.5  # times the final step: the step of that trial run
+LEAST_REFINEMENT = 0.7  # largest ratio of successive steps
+SHORTEST = 0.2  # smallest ratio of successive steps
+RATIOS = (1e-3, 2.0)  # of steps, between which the one that is needed is looked for
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A run with one step on one mesh."""
+
+    job: Job
+    grid: TimeGrid
+    samples: list[Sample]
+    end: RunEnd
+
+    @property
+    def step(self) -> float:
+        """Largest step [s]."""
+        return self.grid.time_step
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it has all outputs of the run."""
+        return self.step <= self.job.choice.output_step * (1 + 1e-9)
+
+    @property
+    def cost(self) -> int:
+        """Steps times unknowns."""
+        return self.end.steps * self.job.plant.size
+
+    @property
+    def times(self) -> Array:
+        """Times of the samples [s]."""
+        return np.array([sample.time for sample in self.samples])
+
+    @property
+    def tips(self) -> Array:
+        """Tip deflections [m]."""
+        plant = self.job.plant
+        depths = [max(sample.depth, plant.smallest_depth) for sample in self.samples]
+        return np.array([plant.points(z).rows[-1] @ s.coordinates for z, s in zip(depths, self.samples, strict=True)])
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What the differences of runs with ever shorter steps let expect of the last one: an error high x^order + low x^slowest.
+
+    x is the ratio of a step to the last one; the error is that of the tip, relative to the largest tip deflection.
+
+    Attributes
+    ----------
+    high, order
+        Part that falls with the order of the method.
+    low, slowest
+        Part that falls slowly: vibrations that the steps do not resolve.
+    observed
+        Whether an order was observed; otherwise the error is a hope.
+    """
+
+    high: float
+    order: float
+    low: float = 0.0
+    slowest: float = 1.0
+    observed: bool = True
+
+    def error(self, ratio: float = 1.0) -> float:
+        """Return the error with a step of a ratio to the last one."""
+        return self.high * ratio**self.order + self.low * ratio**self.slowest
+
+    def ratio(self, allowed: float) -> float:
+        """Return the ratio of the step that keeps an allowed error, within bounds."""
+        if self.error(RATIOS[0]) >= allowed:
+            return RATIOS[0]
+        if self.error(RATIOS[1]) <= allowed:
+            return RATIOS[1]
+        return float(brentq(lambda ratio: self.error(ratio) - allowed, *RATIOS))
+
+
+def expectation(steps: list[float], differences: list[float], order: float) -> Expectation:
+    """Return what is to be expected of the last of at least two runs, with a factor of `SAFETY`.
+
+    The last two differences are those of C h^p + D h with non-negative C and D, p the order of the method; where they fall more
+    slowly than with order 1, those of one term of the order that they have.
+
+    Parameters
+    ----------
+    steps
+        Falling [s].
+    differences
+        Of successive runs, one less, relative to the largest tip deflection.
+    order
+        Of the method.
+    """
+    last, ratio = SAFETY * differences[-1], steps[-2] / steps[-1]
+    if len(differences) < 2:
+        hoped = FIRST * order
+        return Expectation(last / (ratio**hoped - 1.0), hoped, observed=False)
+    first, before = SAFETY * differences[-2], steps[-3] / steps[-1]
+    parts = [[before**p - ratio**p for p in (order, 1.0)], [ratio**p - 1.0 for p in (order, 1.0)]]
+    high, low = np.linalg.solve(parts, [first, last])
+    if low <= 0.0:
+        return Expectation(last / (ratio**order - 1.0), order)
+    if high >= 0.0:
+        return Expectation(float(high), order, float(low))
+    slowest = SMALLEST_ORDER
+    if _quotient(before, ratio, slowest) < first / last:
+        slowest = float(brentq(lambda p: _quotient(before, ratio, p) - first / last, slowest, 1.0))
+    return Expectation(0.0, order, last / (ratio**slowest - 1.0), slowest)
+
+
+def _quotient(before: float, ratio: float, order: float) -> float:
+    return (before**order - ratio**order) / (ratio**order - 1.0)
+
+
+class _InterruptedError(Exception):
+    """Somebody interrupted a trial run; it is the last one."""
+
+
+@dataclass
+class _Search:
+    """What changes while mesh and step are looked for.
+
+    Attributes
+    ----------
+    job
+        With the mesh of the final run.
+    trials
+        All runs so far, the one that is delivered last.
+    error
+        Estimated time error of the last run, relative to the largest tip deflection; None before the final run.
+    """
+
+    job: Job
+    trials: list[_Trial]
+    error: float | None = None
+
+    @property
+    def tolerance(self) -> float:
+        """The scene's tolerance."""
+        return self.job.scene.numerics.tolerance
+
+    @property
+    def allowed(self) -> float:
+        """What the time step may cost: what mesh and left-out inertia leave of the tolerance, at least a part of it."""
+        others = (self.job.chosen.error or 0.0) + self.job.choice.inertia_error
+        return max(self.tolerance - others, LEAST_TIME_SHARE * self.tolerance)
+
+    def run(self, job: Job, step: float, *, final: bool = False) -> _Trial:
+        """Run once with a step of at most ``step`` [s]; a final run has all outputs.
+
+        Raises
+        ------
+        ComputationError
+            With the trajectory so far.
+        """
+        grid, samples = sampled_grid(job, min(step, job.choice.output_step) if final else step), list[Sample]()
+        try:
+            end = collect(job, grid, samples, live=False)
+        except ComputationError as error:
+            error.partial = trajectory_of(job, grid, samples, None, RunEnd("failed", grid.steps)) if samples else None
+            self.trials.append(_Trial(job, grid, samples, RunEnd("failed", grid.steps)))
+            raise
+        self.trials.append(_Trial(job, grid, samples, end))
+        if end.reason == "interrupted":
+            raise _InterruptedError
+        return self.trials[-1]
+
+
+def run_refined(job: Job) -> Trajectory:
+    """Run with the steps that the tolerance needs, and on the mesh that it needs where the mesh is free.
+
+    Raises
+    ------
+    ComputationError
+        If a step fails, or if rounding alone costs more than the tolerance allows.
+    """
+    search = _Search(job, [])
+    try:
+        _find_step(search, _settle_mesh(search))
+    except _InterruptedError:
+        search.error = None
+    except ComputationError:
+        if search.trials and search.trials[-1].end.reason == "failed":
+            _show(search)
+        raise
+    return _show(search)
+
+
+def _settle_mesh(search: _Search) -> _Trial:
+    """Take more elements until a finer mesh moves the tip little, in runs with the coarsest step; return the last of them."""
+    trial = _first_trial(search)
+    for _ in range(MOST_MESHES):
+        chosen = search.job.chosen
+        ladder, plant = chosen.ladder, chosen.plant
+        finer = None if ladder is None else ladder.finer(plant, LEAST_FINER)
+        if ladder is None or finer is None:
+            break
+        other = search.run(replace(search.job, chosen=ladder.choice(finer, 0.0)), trial.step)
+        moved = MESH_SAFETY * difference(trial, other)
+        allowed = MESH_SHARE * search.tolerance
+        search.job = replace(search.job, chosen=ladder.choice(plant, moved))
+        if moved <= allowed:
+            break
+        wanted = ladder.finer(plant, (moved / allowed) ** (1.0 / MESH_ORDER))
+        if wanted is None or wanted.size <= finer.size:
+            wanted, trial = finer, other
+        search.job = replace(search.job, chosen=ladder.choice(wanted, moved))
+        if trial is not other:
+            trial = search.run(search.job, trial.step)
+    return trial
+
+
+def _first_trial(search: _Search) -> _Trial:
+    step = coarsest_step(search.job)
+    for _ in range(MOST_FAILURES):
+        try:
+            return search.run(search.job, step)
+        except ComputationError:  # such as a cut path in whose curvature so long a step does not converge
+            step /= 2.0
+    return search.run(search.job, step)
+
+
+def _find_step(search: _Search, first: _Trial) -> None:
+    """Run with ever shorter steps until the estimated error of a run with all outputs is allowed."""
+    order = TIME_ORDER if is_undamped(search.job) else TIME_ORDER - 1
+    runs, differences = [first, search.run(search.job, first.step / 2.0)], list[float]()
+    while True:
+        differences.append(difference(*runs[-2:]))
+        expected = expectation([run.step for run in runs], differences, order)
+        search.error = expected.error() if expected.observed else differences[-1]
+        if search.error <= search.allowed and runs[-1].is_whole:
+            return
+        ratio = next_ratio(expected, AIM * search.allowed)
+        if len(search.trials) >= MOST_RUNS or runs[-1].end.steps / ratio > MOST_STEPS:
+            break
+        _refuse_rounding(search, runs[-1].end.steps / ratio)
+        runs.append(search.run(search.job, runs[-1].step * ratio, final=search.error <= search.allowed))
+    if not runs[-1].is_whole:
+        search.run(search.job, runs[-1].step, final=True)
+
+
+def _refuse_rounding(search: _Search, steps: float) -> None:
+    """Refuse steps whose round-off, which adds up as a random walk, is more than the tolerance.
+
+    Raises
+    ------
+    ComputationError
+        With what it would be.
+    """
+    lost = search.job.chosen.round_off * sqrt(steps)
+    if lost > search.allowed:
+        raise ComputationError(
+            f"numerics.tolerance = {search.tolerance:g} needs about {steps:.0g} steps, in which rounding alone moves the tip by "
+            f"{lost:.1e} of its largest deflection: ask for {2 * lost:.1e} or more"
+        )
+
+
+def next_ratio(expected: Expectation, allowed: float) -> float:
+    """Return the ratio of the next step to the last one: the final step at once where it is near, a trial before it where not."""
+    ratio = expected.ratio(allowed)
+    if ratio < FINAL_RATIO:
+        ratio = max(BEFORE_FINAL * ratio, SHORTEST)
+    return min(ratio, LEAST_REFINEMENT)
+
+
+def difference(coarser: _Trial, finer: _Trial) -> float:
+    """Return the largest difference of two runs' tips at common times and at the end, relative to the finer one's largest tip."""
+    times, others = coarser.times, finer.times
+    tips, other_tips = coarser.tips, finer.tips
+    scale = max(float(np.max(np.abs(other_tips))), finer.job.scene.numerics.absolute_tolerance)
+    slack = 1e-9 * others[-1]
+    places = np.minimum(np.searchsorted(others, times - slack), len(others) - 1)
+    common = np.abs(others[places] - times) <= slack
+    common[-1] = False  # a push may end at slightly different times
+    before = float(np.max(np.abs(tips - other_tips[places])[common], initial=0.0))
+    return max(before, abs(float(tips[-1] - other_tips[-1]))) / scale
+
+
+def is_undamped(job: Job) -> bool:
+    """Return whether the integrator has a spectral radius of 1, and with it its full order."""
+    stepper = stepper_of(job)
+    return isinstance(stepper, DynamicStepper) and abs(float(np.sum(stepper.method.nodes)) - 1.0) < 1e-12
+
+
+def coarsest_step(job: Job) -> float:
+    """Return the step [s] of the first trial run: loads are just resolved, and the slowest vibration where it may matter."""
+    step = likely_duration(job.scene) / FEWEST_STEPS
+    step = min(step, shortest_period(job.scene) / STEPS_PER_LOAD_PERIOD)
+    if job.choice.analysis == "dynamic" and job.choice.vibration > VIBRATION_SHARE * job.scene.numerics.tolerance:
+        step = min(step, longest_period(job.plant) / STEPS_PER_NATURAL_PERIOD)
+    return step
+
+
+def sampled_grid(job: Job, step: float) -> TimeGrid:
+    """Return the grid of a trial run with steps of at most ``step`` [s], which samples often enough to be compared.
+
+    Long steps skip outputs, short ones divide them evenly.
+    """
+    output, duration = job.choice.output_step, likely_duration(job.scene)
+    grid = time_grid(job.plant, output, output)
+    if step >= output * (1 - 1e-9):
+        every = max(1, floor(step / output * (1 + 1e-9)))
+        return TimeGrid((*grid.outputs[:-1:every], grid.outputs[-1]), grid.landings, every * output)
+    parts = ceil(output / step * (1 - 1e-9))
+    between = ceil(parts / ceil(FEWEST_SAMPLES * output / duration))  # steps from sample to sample
+    samples = ceil(parts / between)
+    times = [grid.outputs[0]]
+    for start, end in pairwise(grid.outputs):
+        count = max(1, ceil((end - start) / output * samples - 1e-9))
+        inner = np.linspace(start, end, count + 1)[1:-1].tolist()
+        near = 1e-9 * output
+        times += [time for time in inner if all(abs(time - landing) > near for landing in grid.landings)]
+        times.append(end)
+    return TimeGrid(tuple(times), grid.landings, output / (samples * between))
+
+
+def _show(search: _Search) -> Trajectory:
+    """Show the last run to the observer and return it."""
+    trial, job = search.trials[-1], search.trials[-1].job
+    grid = time_grid(job.plant, trial.step, job.choice.output_step)
+    wanted = set(grid.outputs)
+    samples = [sample for sample in trial.samples if sample.time in wanted or sample is trial.samples[-1]]
+    begin(job, grid)
+    run = trajectory_of(job, grid, samples, None, trial.end)
+    if search.error is not None:
+        run.summary["error_estimate"] = total_error(search.job, search.error)
+    if search.error is not None and search.error > search.allowed:
+        run.summary["warnings"].append(
+            f"the tolerance {search.tolerance:g} was not reached with {trial.end.steps} steps: see error_estimate"
+        )
+    residual = run.summary["relative_energy_residual"]
+    if search.error is not None and residual > search.tolerance:
+        run.summary["warnings"].append(f"the energy balance lacks {residual:.1e} of the largest energy: more than the tolerance")
+    run.summary["step_unknowns"] = sum(other.cost for other in search.trials)
+    return shown(job, run, samples)

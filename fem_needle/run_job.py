@@ -1,0 +1,186 @@
+"""One computation of a run: who watches, which stepper, samples and summary."""
+
+from __future__ import annotations
+
+import time as clock
+from dataclasses import asdict, dataclass
+from typing import Any, Protocol
+
+from fem_needle.choices import Choice
+from fem_needle.collocation import collocation
+from fem_needle.errors import ComputationError
+from fem_needle.loops import run_loop
+from fem_needle.march import RunEnd, TimeGrid, time_grid
+from fem_needle.modal_stepper import ModalStepper, needs_no_steps
+from fem_needle.models import ChosenPlant
+from fem_needle.plant import Plant
+from fem_needle.samples import Sample
+from fem_needle.scene import Scene
+from fem_needle.skipping import inertia_free_stepper
+from fem_needle.steppers import DynamicStepper, Inviscid, StaticStepper, Stepper
+from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
+
+
+class Observer(Protocol):
+    """Somebody who watches a run: a progress bar, a writer of run folders."""
+
+    def begin(self, plant: Plant, choice: dict[str, Any]) -> None:
+        """Learn what is going to be computed."""
+
+    def progress(self, fraction: float) -> None:
+        """Learn how much of the run is done, 0 to 1; a refined run starts again."""
+
+    def sample(self, sample: Sample) -> None:
+        """Receive the next sample, once each; of a run that is being refined, when it is accurate enough."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A plant, the scene with the settings of this run, what was chosen, and who watches."""
+
+    chosen: ChosenPlant
+    scene: Scene
+    choice: Choice
+    observer: Observer
+    started: float
+
+    @property
+    def plant(self) -> Plant:
+        """The model that is run."""
+        return self.chosen.plant
+
+
+class Nobody:
+    """Watches nothing."""
+
+    def begin(self, plant: Plant, choice: dict[str, Any]) -> None:
+        """Ignore."""
+
+    def progress(self, fraction: float) -> None:
+        """Ignore."""
+
+    def sample(self, sample: Sample) -> None:
+        """Ignore."""
+
+
+def run_live(job: Job, time_step: float, time_error: float | None) -> Trajectory:
+    """Run once; the observer sees each sample as it comes."""
+    grid = time_grid(job.plant, time_step, job.choice.output_step)
+    begin(job, grid)
+    samples: list[Sample] = []
+    end = collect(job, grid, samples, live=True)
+    return trajectory_of(job, grid, samples, time_error, end)
+
+
+def shown(job: Job, run: Trajectory, samples: list[Sample]) -> Trajectory:
+    """Show finished samples to the observer; an interrupt while it writes leaves the run whole."""
+    try:
+        for sample in samples:
+            job.observer.sample(sample)
+    except KeyboardInterrupt:
+        run.summary["stop_reason"] = "interrupted"
+    return run
+
+
+def stepper_of(job: Job) -> Stepper:
+    """Return how the needle gets from one time to the next."""
+    if job.choice.analysis == "dynamic":
+        if job.scene.numerics.time_step == "auto" and needs_no_steps(job.plant.scene):
+            return ModalStepper(job.plant)
+        return DynamicStepper(job.plant, collocation(_spectral_radius(job)))
+    if job.choice.analysis == "static":
+        return StaticStepper(Inviscid(job.plant))
+    return inertia_free_stepper(job.plant)
+
+
+def _spectral_radius(job: Job) -> float:
+    """Return the scene's, lowered where the plant needs it to stay stable while it moves."""
+    asked = job.scene.numerics.spectral_radius
+    lowest, highest = job.scene.insertion.depth_range(job.scene.duration)
+    moves = highest > lowest or job.scene.insertion.kind == "force"
+    return min(asked, job.plant.largest_spectral_radius) if moves else asked
+
+
+def _warnings(job: Job) -> list[str]:
+    found = [*job.plant.warnings, *job.chosen.warnings]
+    radius, asked = _spectral_radius(job), job.scene.numerics.spectral_radius
+    if job.choice.analysis == "dynamic" and radius < asked:
+        found.append(
+            f"numerics.spectral_radius = {asked:g} > {radius:g}, with which this model stays stable while it moves: "
+            f"{radius:g} is used"
+        )
+    return found
+
+
+def begin(job: Job, grid: TimeGrid) -> None:
+    """Tell the observer what is going to be computed."""
+    job.observer.begin(job.plant, _settings(job, grid) | {"output_times": grid.outputs})
+
+
+def collect(job: Job, grid: TimeGrid, samples: list[Sample], *, live: bool) -> RunEnd:
+    """Append the samples of a run and return how it ended.
+
+    Raises
+    ------
+    ComputationError
+        With ``partial``, the trajectory so far.
+    """
+    try:
+        marching = run_loop(job.plant, stepper_of(job), grid)
+        while True:
+            try:
+                sample = next(marching)
+            except StopIteration as finished:
+                return finished.value
+            samples.append(sample)
+            job.observer.progress(sample.time / grid.outputs[-1])
+            if live:
+                job.observer.sample(sample)
+    except KeyboardInterrupt:
+        if not samples:
+            raise
+        return RunEnd("interrupted", grid.steps)
+    except ComputationError as error:
+        error.partial = trajectory_of(job, grid, samples, None, RunEnd("failed", grid.steps)) if samples else None
+        raise
+
+
+def trajectory_of(job: Job, grid: TimeGrid, samples: list[Sample], time_error: float | None, end: RunEnd) -> Trajectory:
+    """Return samples and summary; ``time_error`` is what the steps are estimated to cost, None where nobody knows."""
+    now = clock.perf_counter()
+    run = trajectory_from_samples(job.plant, samples, {}, job.scene)
+    estimate = None if time_error is None else total_error(job, time_error)
+    run.summary.update(
+        _settings(job, grid)
+        | summary_of(run)
+        | {
+            "error_estimate": estimate,
+            "warnings": _warnings(job),
+            "stop_reason": end.reason,
+            "steps": end.steps,
+            "step_unknowns": end.steps * job.plant.size,
+            "solve_time": now - job.started,
+            "wall_time": now - job.started,
+        }
+    )
+    return run
+
+
+def _settings(job: Job, grid: TimeGrid) -> dict[str, Any]:
+    return job.plant.describe() | {
+        "analysis": job.choice.analysis,
+        "time_step": largest_step(grid),
+        "steps": grid.steps,
+        "skipped": [asdict(skipped) for skipped in job.choice.skipped],
+    }
+
+
+def largest_step(grid: TimeGrid) -> float:
+    """Return the largest step [s]."""
+    return max((end - start) / count for start, end, count in grid.intervals())
+
+
+def total_error(job: Job, time_error: float) -> float | None:
+    """Return the sum of the estimated errors: time step, mesh, left-out inertia; None where the mesh was not checked."""
+    error = job.chosen.error
+    return None if error is None else time_error + error + job.choice.inertia_error

@@ -1,0 +1,80 @@
+"""Steps, estimates and refusals of automatic runs."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fem_needle import SceneError, run_scene
+from fem_needle.exact import exact_static
+from fem_needle.finite_element_model import Meshes
+from fem_needle.refined_run import SAFETY, expectation, next_ratio
+from fem_needle.scene_file import load_scene
+from tests.consistency.scenes import LAYERS, moving, scene_of
+
+STEPS = [1.0, 0.5, 0.2]
+
+
+def differences(error):
+    values = [error(step) for step in STEPS]
+    return [float(a - b) for a, b in pairwise(values)]
+
+
+@pytest.mark.parametrize("order", [3.0, 4.0])
+def test_an_error_of_the_methods_order_is_found(order):
+    found = expectation(STEPS, differences(lambda h: h**order), order)
+    assert found.error() == pytest.approx(SAFETY * 0.2**order)
+    assert found.error(0.5) == pytest.approx(SAFETY * 0.1**order)
+    assert found.ratio(SAFETY * 0.1**order) == pytest.approx(0.5)
+
+
+def test_a_part_of_first_order_is_not_hidden_by_the_fourth():
+    """One observed order would extrapolate the small slow part away."""
+    found = expectation(STEPS, differences(lambda h: h**4 + 0.01 * h), 4.0)
+    assert found.error() == pytest.approx(SAFETY * (0.2**4 + 0.01 * 0.2))
+
+
+@pytest.mark.parametrize("order", [0.6, 1.0, 2.0, 3.0])
+def test_slower_errors_are_bounded(order):
+    found = expectation(STEPS, differences(lambda h: h**order), 4.0)
+    assert 0.2**order < found.error() < 10.0 * 0.2**order
+
+
+def test_errors_that_do_not_fall_count_in_full():
+    assert expectation(STEPS, [1.0, 1.0], 4.0).error() > 1.0
+
+
+def test_one_difference_is_a_hope():
+    assert not expectation(STEPS[:2], [1.0], 4.0).observed
+
+
+def test_a_far_step_gets_a_trial_run_first():
+    near, far = (expectation(STEPS, differences(lambda h: h**4), 4.0) for _ in range(2))
+    assert next_ratio(near, near.error(0.5)) == pytest.approx(0.5)
+    assert next_ratio(far, far.error(0.1)) == pytest.approx(0.25)
+
+
+def test_a_tolerance_below_round_off_is_refused():
+    insertion = moving(0.05, 0.02, 0.18)
+    scene = scene_of("entry", insertion, LAYERS, numerics={"analysis": "static", "output_step": 0.125})
+    with pytest.raises(SceneError, match=r"numerics.tolerance: less than double precision .* allowed from (\S+) on") as caught:
+        run_scene(scene, tolerance=1e-10)
+    smallest = float(str(caught.value).split("allowed from ")[1].split()[0])
+    assert 1e-10 < smallest < 1e-8
+    run = run_scene(scene, tolerance=1.1 * smallest)
+    exact = np.array([exact_static(scene, depth).tip_deflection for depth in run.depth.tolist()])
+    assert np.max(np.abs(run.tip_deflection - exact)) < 1.1 * smallest * np.max(np.abs(exact))
+
+
+def test_few_elements_are_enough_for_bench_m():
+    run = run_scene(load_scene("bench-m").with_value("numerics.output_step", 0.1))
+    assert run.summary["elements"] <= 3
+    assert run.summary["steps"] <= 100
+    assert run.summary["step_unknowns"] >= run.summary["steps"] * run.plant.size
+
+
+def test_the_ladder_of_meshes_ends():
+    meshes = Meshes(load_scene("bench-m"), "dynamic")
+    assert meshes.finer(meshes.needle(2), 1.5).describe()["elements"] == 3
+    assert meshes.finer(meshes.needle(2), 100.0).describe()["elements"] == 256
+    assert meshes.finer(meshes.needle(2), 1000.0) is None
