@@ -23,6 +23,7 @@ from fem_needle.benchmark.result import GoalRow, Row
 from fem_needle.errors import NeedleError
 
 MICROSECONDS = 1e6
+LARGEST_TIP = 3.0  # of the true one: a vibration that grows is far above, one that a sudden load leaves is up to 2
 ORDER = 3.9  # of the two-stage collocation: 4
 
 
@@ -131,7 +132,7 @@ def all_goals(scenes: int) -> tuple[Goal, ...]:
         *_times_to_error(),
         Goal("3", f"tolerance kept in {scenes} random scenes", HIT_RATE, "%", lambda rows: hit_rate(scenes), at_least=True),
         Goal("3", "tolerance: cost / cheapest fixed setting", 2.0, "x", cost_of_tolerance),
-        Goal("4", "two modes, steps of 1 to 100 ms: tip / true tip", 1.5, "x", lambda rows: stability_of_two_modes()),
+        Goal("4", "two modes, steps of 1 to 100 ms: tip / true tip", LARGEST_TIP, "x", lambda rows: stability_of_two_modes()),
         Goal("4", "two modes: a step", 0.15, "us", lambda rows: time_per_step_of_two_modes()),
         Goal("5", "process `run thesis`", 1.0, "s", lambda rows: time_of_command("run", "thesis")),
         Goal("5", "process `run thesis --no-vtk`", 0.7, "s", lambda rows: time_of_command("run", "thesis", "--no-vtk")),

@@ -47,9 +47,9 @@ class FixedElements(OwnMethod):
     name = "finite elements"
     choices: ClassVar[Mapping[str, tuple[Setting, ...]]] = {
         "S": over((1, 2, 4, 8)),
-        "D": over((2, 4, 8, 16, 32, 64)),
-        "M": over((4, 8, 16, 40), time_steps=(1e-2, 1e-2, 2e-3, 1e-3)),
-        "M2": over((4, 8, 8, 16, 40), time_steps=(5e-3, 2e-3, 1e-3, 5e-4, 5e-4)),
+        "D": over((2, 4, 8, 16, 32, 64, 128)),
+        "M": over((1, 2, 4, 8, 16, 40), time_steps=(1e-2, 1e-2, 1e-2, 1e-2, 2e-3, 1e-3)),
+        "M2": over((2, 4, 8, 8, 16, 40, 16, 16), time_steps=(5e-3, 5e-3, 2e-3, 1e-3, 5e-4, 5e-4, 1e-4, 2.5e-5)),
         "brachytherapy": over((4, 8, 16, 32), time_steps=(5e-2, 2e-2, 1e-2, 5e-3)),
     }
 

@@ -75,4 +75,4 @@ def _legend(axes: Axes, styles: dict[str, dict[str, Any]]) -> None:
     lines.append(Line2D([], [], label="goal", marker="x", markersize=9, markeredgewidth=2.2, color=INK, linestyle="none"))
     axes.axis("off")
     axes.legend(handles=lines, loc="center left", frameon=False, fontsize=8.5, handlelength=3.0, borderaxespad=0.0)
-    axes.set_title("left and down is better; errors below 1e-13 at 1e-13", loc="left", fontsize=9)
+    axes.set_title("left and down is better\nerrors below 1e-13 are drawn at 1e-13", loc="left", fontsize=9)

@@ -17,7 +17,7 @@ from fem_needle.scene import Scene
 Array = NDArray[np.float64]
 
 OUTPUTS = 50
-STEPS_PER_RADIAN = 6.0
+STEPS_PER_RADIAN = 24.0  # twice as many change the tips by up to 1.2e-7 of the largest
 
 
 @dataclass(frozen=True, eq=False)
