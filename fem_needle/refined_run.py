@@ -44,6 +44,7 @@ SAFETY = 1.5  # of an error that follows from an observed order
 MESH_SAFETY = 1.25  # of a difference from a finer mesh
 LEAST_FINER = 1.5  # times as many elements: a mesh to compare with
 MESH_ORDER = 5.0  # of the mesh's error in motion, to guess the elements that are needed
+PROVEN = 2.5  # ratio of steps over which an observed order is trusted
 FINAL_RATIO = 0.4  # of the last step: a shorter final step first gets a trial run of its own
 BEFORE_FINAL = 2.5  # times the final step: the step of that trial run
 LEAST_REFINEMENT = 0.7  # largest ratio of successive steps
@@ -100,15 +101,15 @@ class Expectation:
         Part that falls with the order of the method.
     low, slowest
         Part that falls slowly: vibrations that the steps do not resolve.
-    observed
-        Whether an order was observed; otherwise the error is a hope.
+    bound
+        On the error of the last run, by which it is accepted: what the differences show, where ``error`` is what they let hope.
     """
 
     high: float
     order: float
     low: float = 0.0
     slowest: float = 1.0
-    observed: bool = True
+    bound: float = 0.0
 
     def error(self, ratio: float = 1.0) -> float:
         """Return the error with a step of a ratio to the last one."""
@@ -127,7 +128,8 @@ def expectation(steps: list[float], differences: list[float], order: float) -> E
     """Return what is to be expected of the last of at least two runs, with a factor of `SAFETY`.
 
     The last two differences are those of C h^p + D h with non-negative C and D, p the order of the method; where they fall more
-    slowly than with order 1, those of one term of the order that they have.
+    slowly than with order 1, those of one term of the order that they have. One difference proves no order, and none proves it
+    over more than a ratio of steps of `PROVEN`: slow parts hide behind the error of the run before.
 
     Parameters
     ----------
@@ -141,18 +143,20 @@ def expectation(steps: list[float], differences: list[float], order: float) -> E
     last, ratio = SAFETY * differences[-1], steps[-2] / steps[-1]
     if len(differences) < 2:
         hoped = FIRST * order
-        return Expectation(last / (ratio**hoped - 1.0), hoped, observed=False)
+        return Expectation(last / (ratio**hoped - 1.0), hoped, bound=last)
     first, before = SAFETY * differences[-2], steps[-3] / steps[-1]
     parts = [[before**p - ratio**p for p in (order, 1.0)], [ratio**p - 1.0 for p in (order, 1.0)]]
     high, low = np.linalg.solve(parts, [first, last])
+    proven = last / (min(ratio, PROVEN) ** order - 1.0)
     if low <= 0.0:
-        return Expectation(last / (ratio**order - 1.0), order)
+        return Expectation(last / (ratio**order - 1.0), order, bound=proven)
     if high >= 0.0:
-        return Expectation(float(high), order, float(low))
+        return Expectation(float(high), order, float(low), bound=max(float(high + low), proven))
     slowest = SMALLEST_ORDER
     if _quotient(before, ratio, slowest) < first / last:
         slowest = float(brentq(lambda p: _quotient(before, ratio, p) - first / last, slowest, 1.0))
-    return Expectation(0.0, order, last / (ratio**slowest - 1.0), slowest)
+    slow = last / (ratio**slowest - 1.0)
+    return Expectation(0.0, order, slow, slowest, bound=max(slow, proven))
 
 
 def _quotient(before: float, ratio: float, order: float) -> float:
@@ -274,7 +278,7 @@ def _find_step(search: _Search, first: _Trial) -> None:
     while True:
         differences.append(difference(*runs[-2:]))
         expected = expectation([run.step for run in runs], differences, order)
-        search.error = expected.error() if expected.observed else differences[-1]
+        search.error = expected.bound
         if search.error <= search.allowed and runs[-1].is_whole:
             return
         ratio = next_ratio(expected, AIM * search.allowed)

@@ -45,7 +45,15 @@ def test_errors_that_do_not_fall_count_in_full():
 
 
 def test_one_difference_is_a_hope():
-    assert not expectation(STEPS[:2], [1.0], 4.0).observed
+    found = expectation(STEPS[:2], [1.0], 4.0)
+    assert found.error() < 0.5
+    assert found.bound >= 1.0
+
+
+def test_no_order_is_trusted_over_a_long_jump():
+    """What the last run still has hides behind the error of the run before."""
+    found = expectation([1.0, 0.5, 0.1], [0.9375, 0.0624], 4.0)
+    assert found.bound > 10.0 * found.error()
 
 
 def test_a_far_step_gets_a_trial_run_first():
