@@ -6,9 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fem_needle import FiniteElementNeedle, ledger, run_scene, simulate, solve_static
+from fem_needle import FiniteElementNeedle, ledger, leg_works, run_scene, simulate, solve_static
 from fem_needle.exact import exact_static
 from fem_needle.ledger import configuration_force
+from fem_needle.leg import Leg
 from fem_needle.loads import load_case
 from fem_needle.motion import Instant
 from fem_needle.scene import Friction, Guide, Insertion, LateralLoad, Layer, Model, Numerics, Sinusoid, Table, TipLoad
@@ -158,23 +159,32 @@ def test_dropped_below_the_smallest_depth_and_inserted_again():
 # Break one term at a time and see the residual.
 
 
-def broken(monkeypatch, name, change, scene_name):
-    intact = residual(scene_name, 2e-5)
-    original = getattr(ledger, name)
-    monkeypatch.setattr(ledger, name, lambda *args, **options: change(original(*args, **options)))
+BROKEN = {
+    "numpy": [(ledger, name) for name in ("energy_force", "contact_force", "dissipation", "_hub_power", "axial_momentum")],
+    "compiled": [
+        *((Leg, name) for name in ("energy_forces", "contact_forces", "dissipation", "axial_momenta")),
+        (leg_works, "_hub_steps"),
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("loop", "place", "name"),
+    [(loop, *term) for loop, terms in BROKEN.items() for term in terms],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_broken_term_shows(monkeypatch, loop, place, name):
+    scene_name = "growing" if name.startswith("axial") else "hub moves, swells, force travels"
     case, analysis, _, _ = SCENES[scene_name]
-    wrong = residual_of(case, analysis, 2e-5)
-    return wrong / intact
-
-
-@pytest.mark.parametrize("name", ["energy_force", "contact_force", "dissipation", "_hub_power", "axial_momentum"])
-def test_a_broken_term_shows(monkeypatch, name):
-    scene_name = "growing" if name == "axial_momentum" else "hub moves, swells, force travels"
-    assert broken(monkeypatch, name, lambda value: 1.01 * value, scene_name) > 100.0
+    case = case.with_value("numerics.loop", loop)
+    intact, original = residual_of(case, analysis, 2e-5), getattr(place, name)
+    monkeypatch.setattr(place, name, lambda *args, **options: 1.01 * original(*args, **options))
+    assert residual_of(case, analysis, 2e-5) > 100.0 * intact
 
 
 def test_a_missing_work_of_swelling_shows(monkeypatch):
     case, analysis, _, _ = SCENES["hub moves, swells, force travels"]
+    case = case.with_value("numerics.loop", "numpy")
     plain = FiniteElementNeedle.operators
 
     def without(self, depth, time):
