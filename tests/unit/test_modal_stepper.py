@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fem_needle import FiniteElementNeedle, load_scene, run_scene, simulate
+from fem_needle import FiniteElementNeedle, SceneError, load_scene, run_scene, simulate
 from fem_needle.exact import ReleaseFromTipForce
 from fem_needle.modal_stepper import needs_no_steps
 from fem_needle.scene import Guide, Initial, LateralLoad, Layer, Sinusoid, TipLoad
@@ -50,9 +50,10 @@ def test_the_estimate_bounds_the_error_of_a_release(tolerance):
 
 
 def test_what_cannot_be_reached_is_said():
-    run = run_scene(load_scene("bench-d").with_values({"run.duration": 0.02, "numerics.tolerance": 1e-8}))
-    assert run.summary["error_estimate"] > 1e-8
-    assert "was not reached" in run.summary["warnings"][0]
+    with pytest.raises(SceneError, match=r"less than double precision keeps .*got 1e-08; allowed from") as caught:
+        run_scene(load_scene("bench-d").with_values({"run.duration": 0.02, "numerics.tolerance": 1e-8}))
+    smallest = float(str(caught.value).split("allowed from ")[1].split()[0])
+    assert 1e-8 < smallest < 1e-5
 
 
 def test_a_step_that_was_asked_for_is_taken():
