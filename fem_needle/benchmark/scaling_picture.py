@@ -23,7 +23,7 @@ def scaling_picture(rows: tuple[ScalingRow, ...]) -> bytes:
         _draw(middle, rows, "elements", "memory")
         _draw(right, rows, "duration", "total")
         left.set_title("M: time of a step", loc="left")
-        middle.set_title("M, 50 steps: memory", loc="left")
+        middle.set_title("M: memory", loc="left")
         right.set_title("M, 40 elements: time of the run", loc="left")
         figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
         return png_bytes(figure)

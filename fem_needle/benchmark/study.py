@@ -134,13 +134,13 @@ def _timed(case: Case, entries: Sequence[_Entry], repeats: int, tell: Callable[[
     rows = {id(entry): entry.row for entry in entries}
     for (entry, _), timing in zip(turns, timings, strict=True):
         times = {"median": timing.median, "lowest": timing.lowest, "highest": timing.highest, "rounds": timing.rounds}
-        rows[id(entry)] = replace(entry.row, **times, whole=_whole(case, entry))  # type: ignore[arg-type]
+        rows[id(entry)] = replace(entry.row, **times, whole=_whole(case, entry, timing.median))  # type: ignore[arg-type]
     return list(rows.values())
 
 
-def _whole(case: Case, entry: _Entry) -> float | None:
-    """Return the time of the whole answer [s], once; None where nothing is prepared, or where it would take too long."""
+def _whole(case: Case, entry: _Entry, time: float) -> float | None:
+    """Return the time of the whole answer [s], once; None where nothing is prepared, or where the solving alone is slow."""
     call = entry.method.whole(case, entry.setting)
-    if call is None or entry.first > SLOW:
+    if call is None or time > SLOW:
         return None
     return seconds(call)

@@ -48,17 +48,15 @@ def take_turns(calls: Sequence[Callable[[], Any]], first: Sequence[float], round
     calls
         What is timed; each has been called once, so that nothing is loaded or compiled here.
     first
-        How long that took [s]. Of a call longer than `SLOW` it counts as a round, and `SLOW_ROUNDS` are enough.
+        How long that took [s], loading and compiling included.
     rounds
-        At least 1.
+        At least 1; of a call longer than `SLOW`, `SLOW_ROUNDS` are enough.
     """
-    found = [[time] if time > SLOW else [] for time in first]
+    found: list[list[float]] = [[] for _ in calls]
     for _ in range(rounds):
         for times, call, before in zip(found, calls, first, strict=True):
-            if before <= SLOW:
+            if len(times) < SLOW_ROUNDS or min(times) <= SLOW:
                 times.append(seconds(call, _enough(before, times)))
-            elif len(times) < min(SLOW_ROUNDS, rounds):
-                times.append(seconds(call))
     return [Timing(median(times), min(times), max(times), len(times)) for times in found]
 
 
