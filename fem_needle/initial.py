@@ -41,12 +41,11 @@ def _initial_solution(plant: Plant, law: DepthLaw, stage: Stage) -> StageSolutio
         return trivial_solution(plant, stage)
     if scene.initial.shape == "equilibrium":
         return _moving_equilibrium(plant, law, stage)
+    zero, guides = np.zeros(plant.size), stage.points.guides
     if scene.initial.shape == "straight":
-        coordinates = plant.straight(*case.clamp)
+        coordinates, reactions = plant.straight(*case.clamp), np.zeros(guides)
     else:
-        coordinates = _tip_displaced(plant, stage, float(scene.initial.tip_deflection or 0.0))
-    zero = np.zeros(plant.size)
-    reactions = np.zeros(stage.points.guides)
+        coordinates, reactions = _tip_displaced(plant, stage, float(scene.initial.tip_deflection or 0.0))
     return StageSolution(coordinates, zero, zero, np.concatenate([reactions, case.forces]))
 
 
@@ -59,17 +58,19 @@ def _moving_equilibrium(plant: Plant, law: DepthLaw, stage: Stage) -> StageSolut
     return StageSolution(rest.coordinates, velocities, start, rest.point_forces)
 
 
-def _tip_displaced(plant: Plant, stage: Stage, tip_deflection: float) -> Array:
-    """Return the clamp's own static shape plus that of a tip force, scaled to the wanted tip."""
+def _tip_displaced(plant: Plant, stage: Stage, tip_deflection: float) -> tuple[Array, Array]:
+    """Return the clamp's own static shape plus that of a tip force, scaled to the wanted tip, and the guides' forces in it."""
     forces = np.zeros_like(stage.case.forces)
     still = np.zeros(2)
 
-    def shape(case: LoadCase) -> Array:
+    def shape(case: LoadCase) -> tuple[Array, Array]:
         instant = stage.instant
-        return static_state(plant, stage.operators, stage.points, case, depth=instant.depth, time=instant.time)[0]
+        coordinates, found = static_state(plant, stage.operators, stage.points, case, depth=instant.depth, time=instant.time)
+        return coordinates, found[: stage.points.guides]
 
-    clamped = shape(replace(stage.case, forces=forces))
+    clamped, held = shape(replace(stage.case, forces=forces))
     forces[-1] = 1.0
-    pushed = shape(replace(stage.case, forces=forces, clamp=still))
+    pushed, reactions = shape(replace(stage.case, forces=forces, clamp=still))
     tip = stage.points.rows[-1]
-    return clamped + (tip_deflection - float(tip @ clamped)) / float(tip @ pushed) * pushed
+    share = (tip_deflection - float(tip @ clamped)) / float(tip @ pushed)
+    return clamped + share * pushed, held + share * reactions

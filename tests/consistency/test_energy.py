@@ -287,3 +287,12 @@ def test_numerical_damping_leaves_a_residual():
     tight = scene("hub", held(0.08), GEL, FINGER, support=JERKED, numerics=Numerics(spectral_radius=1.0))
     lossy = tight.with_value("numerics.spectral_radius", 0.0)
     assert residual_of(lossy, "dynamic", 1e-4) > 100.0 * residual_of(tight, "dynamic", 1e-4)
+
+
+@pytest.mark.parametrize("stiffness", [2e3, "rigid"])
+def test_let_go_from_a_guide(stiffness):
+    """A guide holds energy, and bends the element it lies in, already in the shape that is let go."""
+    guides = {"guides": [Guide(position=-0.0137, stiffness=stiffness)]}
+    start = {"initial": {"shape": "tip-displaced", "tip_deflection": 1e-3}}
+    case = scene("hub", held(0.08), DAMPED, [TipLoad(force=0.0)], support=guides, **start)
+    assert residual_of(case, "dynamic") < 1e-6
