@@ -13,6 +13,8 @@ _HOMES = {
     "suspicious": "fem_needle.checks",
     "run_scene": "fem_needle.simulation",
     "simulate": "fem_needle.simulation",
+    "simulate_many": "fem_needle.batch.many",
+    "ManyRuns": "fem_needle.batch.many",
     "converge": "fem_needle.convergence.study",
     "ConvergenceStudy": "fem_needle.convergence.study",
     "compare": "fem_needle.comparison.study",

@@ -86,6 +86,7 @@ RANKS = {
     "comparison": 17,
     "benchmark": 18,
     "run_folder": 14,
+    "batch": 16,
     "csv_file": 13,
     "matlab_file": 13,
     "vtkhdf_file": 13,

@@ -1,0 +1,194 @@
+"""The compiled loop of `fem_needle.batch`: an ``entry`` needle in one layer, in its own vibrations (theory: docs/theory.md).
+
+In the vibrations of the stretched part, K_1 phi_i = lambda_i M_1 phi_i, everything but the convection is diagonal:
+
+    P = rho A (z a' + v S a),   P' = rho A (v S^T a' + v^2 / z R a) - (EI lambda / z^3 + k z) a - c (z a' + v D a) + F phi(tip).
+
+The lowest vibrations move, the others follow the force at once: their compliance at the tip is added at the outputs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from fem_needle.compiled.bands import ENTRANCE, INNER
+
+# Columns of a run's values.
+(
+    STIFFNESS,
+    MASS,
+    MODULUS,
+    VISCOSITY,
+    DEPTH,
+    SPEED,
+    ARRIVAL,
+    FORCE,
+    AMPLITUDE,
+    FREQUENCY,
+    PHASE,
+    DURATION,
+    OUTPUT_STEP,
+    TIME_STEP,
+) = range(14)
+VALUES = 14
+
+
+@njit(**INNER)
+def _force(run, time):
+    """Return the tip force [N]."""
+    if run[AMPLITUDE] == 0.0:
+        return run[FORCE]
+    return run[FORCE] + run[AMPLITUDE] * np.sin(run[FREQUENCY] * time + run[PHASE])
+
+
+@njit(**INNER)
+def _depth(run, time):
+    """Return z [m]."""
+    return run[DEPTH] + run[SPEED] * min(time, run[ARRIVAL])
+
+
+@njit(**INNER)
+def _start(run, roots, tips, convection, state):
+    """Set amplitudes and momenta of the equilibrium at t = 0, at the rate of the equilibria over the depth."""
+    z, force, speed = run[DEPTH], _force(run, 0.0), run[SPEED] if run[ARRIVAL] > 0.0 else 0.0
+    count = convection.shape[0]
+    for i in range(count):
+        bending = run[STIFFNESS] * roots[i] / z**3
+        stiffness = bending + run[MODULUS] * z
+        state[0, i] = force * tips[i] / stiffness
+        rate = -state[0, i] * (run[MODULUS] - 3.0 * bending / z) / stiffness
+        state[1, i] = z * speed * rate
+    for i in range(count):
+        moved = 0.0
+        for j in range(count):
+            moved += convection[i, j] * state[0, j]
+        state[1, i] = run[MASS] * (state[1, i] + speed * moved)
+
+
+@njit(**INNER)
+def _tip(run, time, roots, tips, count, amplitudes):
+    """Return the tip deflection [m]: what moves, and the rest at equilibrium."""
+    z, moving, resting = _depth(run, time), 0.0, 0.0
+    for i in range(count):
+        moving += tips[i] * amplitudes[i]
+    bending, tissue = run[STIFFNESS] / z**3, run[MODULUS] * z
+    for i in range(count, len(roots)):
+        resting += tips[i] * tips[i] / (bending * roots[i] + tissue)
+    return moving + _force(run, time) * resting
+
+
+@njit(**INNER)
+def _step(run, time, length, speed, roots, tips, convection, centrifugal, drag, method, state, matrix, right):
+    """Take one step of a collocation method with two stages; ``method``: its nodes, A^-1 and b A^-1 (4, 2)."""
+    count, mass = convection.shape[0], run[MASS]
+    matrix[:, :] = 0.0
+    for stage in range(2):
+        now = time + method[0, stage] * length
+        z, force = _depth(run, now), _force(run, now)
+        bending, tissue = run[STIFFNESS] / z**3, run[MODULUS] * z
+        for i in range(count):
+            stiffness, row = bending * roots[i] + tissue, 2 * i + stage
+            total = force * tips[i] - stiffness * state[0, i]
+            matrix[row, row] += stiffness
+            for other in range(2):
+                slope = method[1 + stage, other] / length
+                total += slope * state[1, i]
+                matrix[row, 2 * i + other] += slope * run[VISCOSITY] * z
+                for third in range(2):  # A^-1 M A^-1 with the mass of the stage in the middle
+                    inner = method[1 + third, stage] / length * method[1 + stage, other] / length
+                    matrix[2 * i + third, 2 * i + other] += inner * mass * z
+            right[row] += total
+            if speed != 0.0:
+                for j in range(count):
+                    here = run[VISCOSITY] * speed * drag[i, j] - mass * speed * speed / z * centrifugal[i, j]
+                    right[row] -= here * state[0, j]
+                    matrix[row, 2 * j + stage] += here
+                    for other in range(2):
+                        slope = method[1 + stage, other] / length * mass * speed
+                        matrix[row, 2 * j + other] += slope * (convection[i, j] - convection[j, i])
+                        right[row] -= slope * convection[i, j] * state[0, j]
+
+
+@njit(**INNER)
+def _solve(matrix, right):
+    """Replace the right-hand side by the solution, without pivoting; as in `fem_needle.compiled.bands.factor`."""
+    size = len(right)
+    for i in range(size):
+        inverse = 1.0 / matrix[i, i]
+        for k in range(i + 1, size):
+            share = matrix[k, i] * inverse
+            if share != 0.0:
+                right[k] -= share * right[i]
+                for j in range(i + 1, size):
+                    matrix[k, j] -= share * matrix[i, j]
+    for i in range(size - 1, -1, -1):
+        total = right[i]
+        for j in range(i + 1, size):
+            total -= matrix[i, j] * right[j]
+        right[i] = total / matrix[i, i]
+
+
+@njit(**INNER)
+def _advance(run, time, length, speed, convection, method, right, state):
+    """Extrapolate amplitudes and momenta to the end of a step."""
+    count, mass = convection.shape[0], run[MASS]
+    first, second = method[3, 0], method[3, 1]
+    early, late = _depth(run, time + method[0, 0] * length), _depth(run, time + method[0, 1] * length)
+    for i in range(count):
+        slow = (method[1, 0] * right[2 * i] + method[1, 1] * right[2 * i + 1]) / length
+        fast = (method[2, 0] * right[2 * i] + method[2, 1] * right[2 * i + 1]) / length
+        momentum = (1.0 - first - second) * state[1, i] + mass * (first * early * slow + second * late * fast)
+        if speed != 0.0:
+            for j in range(count):
+                mean = (first + second) * state[0, j] + first * right[2 * j] + second * right[2 * j + 1]
+                momentum += mass * speed * convection[i, j] * mean
+        state[1, i] = momentum
+    for i in range(count):
+        state[0, i] += first * right[2 * i] + second * right[2 * i + 1]
+
+
+@njit(**ENTRANCE)
+def compute_runs(runs, roots, tips, convection, centrifugal, drag, method, outputs, state, matrix, right):
+    """Compute the tips of runs at their outputs; returns the number of time steps.
+
+    Parameters
+    ----------
+    runs
+        A row of values each (runs, VALUES).
+    roots, tips
+        lambda_i and phi_i(tip) of all vibrations (all,).
+    convection, centrifugal, drag
+        S, R, D of those that move (n, n).
+    method
+        Nodes, A^-1, b A^-1 (4, 2).
+    outputs
+        Where the tips go (runs, outputs); as many of a row as the run has.
+    state, matrix, right
+        Work space (2, n), (2 n, 2 n), (2 n,).
+    """
+    steps, count = 0, convection.shape[0]
+    for number in range(runs.shape[0]):
+        run = runs[number]
+        last = int(np.floor(run[DURATION] / run[OUTPUT_STEP] * (1.0 + 1e-12)))
+        if last * run[OUTPUT_STEP] <= run[DURATION] * (1.0 - 1e-12):
+            last += 1
+        _start(run, roots, tips, convection, state)
+        outputs[number, 0] = _tip(run, 0.0, roots, tips, count, state[0])
+        for output in range(1, last + 1):
+            time, until = (output - 1) * run[OUTPUT_STEP], min(output * run[OUTPUT_STEP], run[DURATION])
+            while count and time < until:
+                end = run[ARRIVAL] if time < run[ARRIVAL] * (1.0 - 1e-12) and run[ARRIVAL] < until else until
+                parts = max(1, int(np.ceil((end - time) / run[TIME_STEP] - 1e-9)))
+                speed = run[SPEED] if 0.5 * (time + end) < run[ARRIVAL] else 0.0
+                length = (end - time) / parts
+                for part in range(parts):
+                    begin = time + part * length
+                    right[:] = 0.0
+                    _step(run, begin, length, speed, roots, tips, convection, centrifugal, drag, method, state, matrix, right)
+                    _solve(matrix, right)
+                    _advance(run, begin, length, speed, convection, method, right, state)
+                steps += parts
+                time = end
+            outputs[number, output] = _tip(run, until, roots, tips, count, state[0])
+    return steps

@@ -1,0 +1,229 @@
+"""Many runs at once: tips over time, for scenes or for arrays of a scene's values."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fem_needle.batch import loop
+from fem_needle.batch.rows import can_vary, depths_of, row_of, rows_of, times_of
+from fem_needle.batch.spectrum import Spectrum, is_uniform, spectrum_of
+from fem_needle.collocation import collocation
+from fem_needle.errors import ComputationError, SceneError
+from fem_needle.models import build_plant
+from fem_needle.scene import Scene
+from fem_needle.simulation import run_scene
+
+Array = NDArray[np.float64]
+Progress = Callable[[float], None]
+
+PIECES = 16  # of the work, for each core
+STEPS_PER_PERIOD = 12  # of the loads, to begin with
+MOST_LEVELS = 9
+FIRST = (12, 4)  # elements and moving vibrations to begin with
+LAST = (96, 32)
+
+
+@dataclass(frozen=True, eq=False)
+class ManyRuns:
+    """What many runs have computed; SI.
+
+    Attributes
+    ----------
+    time, depth, tip_deflection
+        A row for each run, a column for each of its outputs (runs, outputs); NaN after a run's end.
+    error_estimate
+        Largest estimated tip error of all runs, relative to the run's largest tip deflection; NaN where settings are given.
+    steps
+        Time steps of all runs together.
+    """
+
+    time: Array
+    depth: Array
+    tip_deflection: Array
+    error_estimate: float
+    steps: int
+
+    def __len__(self) -> int:
+        """Return the number of runs."""
+        return len(self.time)
+
+    @property
+    def final_tip_deflection(self) -> Array:
+        """Tip deflection at each run's end [m] (runs,)."""
+        last = np.sum(np.isfinite(self.time), axis=1) - 1
+        return self.tip_deflection[np.arange(len(last)), last]
+
+
+def simulate_many(
+    scenes: Scene | Sequence[Scene],
+    parameters: Mapping[str, ArrayLike] | None = None,
+    *,
+    time_step: float | None = None,
+    vibrations: int | None = None,
+    cores: int | None = None,
+    progress: Progress | None = None,
+) -> ManyRuns:
+    """Compute the tips of many runs.
+
+    Parameters
+    ----------
+    scenes
+        Scenes, or one scene whose values ``parameters`` vary.
+    parameters
+        Arrays of equal length by path, one value for each run: ``{"loads.0.force": forces, "insertion.speed": speeds}``.
+    time_step, vibrations
+        Largest step [s] and number of moving vibrations, where all runs have their own compiled loop; default: halved and
+        doubled until all runs agree to half the first scene's tolerance.
+    cores
+        How many to use; default: all.
+    progress
+        Is told which fraction of the runs is done; from 0 again where they are computed with finer settings.
+
+    Returns
+    -------
+    ManyRuns
+        In the order of the scenes, the same whatever the number of cores.
+
+    Raises
+    ------
+    SceneError
+        If a path or a value is impossible, or there is nothing to compute.
+
+    Notes
+    -----
+    Runs of the uniform kind (support ``entry``, one layer, constant speed, tip forces that are constant or a sinusoid, a start in
+    equilibrium) that share needle length and model go through one compiled loop, without any Python for a run. All others are
+    run one by one (`run_scene`), in as many processes as there are cores.
+    """
+    told = progress or _nobody
+    workers = cores or os.cpu_count() or 1
+    if isinstance(scenes, Scene):
+        given = parameters or {}
+        if is_uniform(scenes) and can_vary(scenes, list(given)):
+            return _compiled(scenes, rows_of(scenes, given), time_step, vibrations, workers, told)
+        return _one_by_one(_varied(scenes, given), workers, told)
+    if parameters is not None:
+        raise SceneError("parameters: vary one scene (got several; allowed one scene with parameters, or scenes alone)")
+    many = list(scenes)
+    if not many:
+        raise SceneError("scenes: nothing to compute (got 0; allowed 1 or more)")
+    if all(is_uniform(scene) and _shares(scene, many[0]) for scene in many):
+        return _compiled(many[0], np.array([row_of(scene) for scene in many]), time_step, vibrations, workers, told)
+    return _one_by_one(many, workers, told)
+
+
+def _nobody(fraction: float) -> None:
+    """Tell nobody."""
+
+
+def _shares(scene: Scene, first: Scene) -> bool:
+    return scene.model == first.model and scene.needle.length == first.needle.length
+
+
+def _varied(scene: Scene, parameters: Mapping[str, ArrayLike]) -> list[Scene]:
+    columns = {path: np.atleast_1d(np.asarray(values, dtype=float)).tolist() for path, values in parameters.items()}
+    counts = sorted({len(values) for values in columns.values()})
+    if len(counts) > 1:
+        raise SceneError(f"parameters: as many values each (got {counts}; allowed one number of them)")
+    return [scene.with_values(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)] or [scene]
+
+
+def _compiled(
+    scene: Scene, rows: Array, time_step: float | None, vibrations: int | None, cores: int, progress: Progress
+) -> ManyRuns:
+    """Compute uniform runs, with finer and finer settings where none are given."""
+    times = times_of(rows)
+    elements, moving = FIRST
+    step = min(float(np.min(rows[:, loop.OUTPUT_STEP])), _shortest_period(rows) / STEPS_PER_PERIOD)
+    is_given = time_step is not None and vibrations is not None
+    coarser, estimate = None, np.nan
+    for _ in range(MOST_LEVELS):
+        spectrum = _spectrum(scene, LAST[0] if is_given else elements, moving if vibrations is None else vibrations)
+        tips, steps = _tips(rows, times, spectrum, step if time_step is None else time_step, cores, progress)
+        if is_given:
+            break
+        if coarser is not None:
+            estimate = _difference(coarser, tips)
+            if estimate <= 0.5 * scene.numerics.tolerance:
+                break
+        coarser, step = tips, step / 2
+        elements, moving = min(2 * elements, LAST[0]), min(2 * moving, LAST[1])
+    return ManyRuns(times, depths_of(rows, times), tips, estimate, steps)
+
+
+def _shortest_period(rows: Array) -> float:
+    """Return the shortest period [s] of all runs' forces, infinity where none swings."""
+    fastest = float(np.max(np.abs(rows[:, loop.FREQUENCY]) * (rows[:, loop.AMPLITUDE] != 0.0)))
+    return 2 * np.pi / fastest if fastest else np.inf
+
+
+def _difference(coarser: Array, finer: Array) -> float:
+    """Return the largest difference of two tips of a run, relative to its largest tip deflection."""
+    scale = np.nanmax(np.abs(finer), axis=1)
+    return float(np.max(np.nanmax(np.abs(coarser - finer), axis=1) / np.where(scale > 0.0, scale, 1.0)))
+
+
+def _spectrum(scene: Scene, elements: int, moving: int) -> Spectrum:
+    """Return the spectrum of a scene's model; of finite elements with as many elements as asked, unless the scene says."""
+    if scene.model.kind == "fem" and scene.numerics.elements == "auto":
+        scene = scene.with_value("numerics.elements", elements)
+    return spectrum_of(build_plant(scene), moving if scene.numerics.analysis in {"auto", "dynamic"} else 0)
+
+
+def _tips(
+    rows: Array, times: Array, spectrum: Spectrum, time_step: float, cores: int, progress: Progress
+) -> tuple[Array, int]:
+    """Return the tips (runs, outputs) and the number of steps: each core takes one piece of the runs after the other."""
+    rows = rows.copy()
+    rows[:, loop.TIME_STEP] = time_step
+    tips = np.full(times.shape, np.nan)
+    edges = np.unique(np.linspace(0, len(rows), min(len(rows), PIECES * cores) + 1).astype(int))
+    method = collocation(1.0)
+    constants = np.stack([method.nodes, *method.inverse, method.end])
+
+    def compute(first: int, last: int) -> int:
+        count = len(spectrum.convection)
+        matrices = (spectrum.convection, spectrum.centrifugal, spectrum.drag)
+        work = (np.zeros((2, count)), np.zeros((2 * count, 2 * count)), np.zeros(2 * count))
+        return int(
+            loop.compute_runs(rows[first:last], spectrum.roots, spectrum.tips, *matrices, constants, tips[first:last], *work)
+        )
+
+    steps, done = 0, 0
+    with ThreadPoolExecutor(cores) as pool:
+        waiting = {pool.submit(compute, int(a), int(b)): int(b - a) for a, b in pairwise(edges)}
+        for finished in as_completed(waiting):
+            steps, done = steps + finished.result(), done + waiting[finished]
+            progress(done / len(rows))
+    if not np.array_equal(np.isfinite(tips), np.isfinite(times)):
+        number = int(np.argmax(np.any(np.isfinite(tips) != np.isfinite(times), axis=1)))
+        raise ComputationError(f"run {number} has no finite answer: check its values, or use a smaller time_step")
+    return tips, steps
+
+
+def _one_by_one(scenes: list[Scene], cores: int, progress: Progress) -> ManyRuns:
+    """Run every scene on its own."""
+    with ProcessPoolExecutor(min(cores, len(scenes))) as pool:
+        waiting = {pool.submit(_one, scene): number for number, scene in enumerate(scenes)}
+        found = {}
+        for finished in as_completed(waiting):
+            found[waiting[finished]] = finished.result()
+            progress(len(found) / len(scenes))
+    longest = max(len(time) for time, *_ in found.values())
+    columns = np.full((3, len(scenes), longest), np.nan)
+    for (number, run), part in product(found.items(), range(3)):
+        columns[part, number, : len(run[part])] = run[part]
+    estimate = float(np.max([np.nan if run[3] is None else run[3] for run in found.values()]))
+    return ManyRuns(columns[0], columns[1], columns[2], estimate, sum(run[4] for run in found.values()))
+
+
+def _one(scene: Scene) -> tuple[Array, Array, Array, float | None, int]:
+    run = run_scene(scene)
+    return run.time, run.depth, run.tip_deflection, run.summary["error_estimate"], int(run.summary["steps"])

@@ -1,0 +1,104 @@
+"""The own vibrations of the inserted part, stretched to a unit length: what the loop of a batch is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from fem_needle import banded
+from fem_needle.motion import run_duration
+from fem_needle.plant import Plant
+from fem_needle.scene import Scene, Sinusoid, Table, TipLoad
+from fem_needle.tables import BENDING, CENTRIFUGAL, CONVECTION, DRAG, MASS
+
+Array = NDArray[np.float64]
+
+SHALLOWEST = 1e-3  # of the length: a needle that is hardly inserted is left to the other loops
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Vibrations of a stretched needle of unit stiffness, mass per length and depth.
+
+    Attributes
+    ----------
+    roots
+        lambda_i of K_1 phi = lambda M_1 phi, rising (all,).
+    tips
+        phi_i(tip) of unit mass (all,).
+    convection, centrifugal, drag
+        S, R and the drag's matrix between the lowest ones (n, n).
+    """
+
+    roots: Array
+    tips: Array
+    convection: Array
+    centrifugal: Array
+    drag: Array
+
+
+def spectrum_of(plant: Plant, moving: int) -> Spectrum:
+    """Return the spectrum of a plant of a scene that `is_uniform`, its lowest ``moving`` vibrations with their convection."""
+    depth = np.array([0.5 * plant.scene.needle.length])
+    matrices, needle = plant.table(depth).matrices, plant.scene.needle
+
+    def unit(kind: int, factor: float) -> Array:
+        """Return a kind for unit depth, stiffness and mass."""
+        base = int(matrices.base_of[kind])
+        band = banded.trailing(np.asfortranarray(matrices.bases[base]), plant.prescribed)
+        return banded.to_dense(band) / factor
+
+    mass = unit(MASS, needle.mass_per_length)
+    roots, shapes = eigh(unit(BENDING, needle.bending_stiffness), mass)
+    lowest = shapes[:, :moving]
+
+    def between(kind: int, factor: float) -> Array:
+        if matrices.base_of[kind] < 0:
+            return np.zeros((moving, moving))
+        return np.ascontiguousarray(lowest.T @ unit(kind, factor) @ lowest)
+
+    tips = plant.points(float(depth[0])).rows[-1, plant.prescribed :] @ shapes
+    convection, centrifugal = (between(kind, needle.mass_per_length) for kind in (CONVECTION, CENTRIFUGAL))
+    return Spectrum(roots, tips, convection, centrifugal, -between(DRAG, 1.0))
+
+
+def is_uniform(scene: Scene) -> bool:
+    """Return whether a run is one of the kind that the batch's own loop knows.
+
+    Support ``entry``, one layer that holds the whole inserted part (or none), a constant speed or none, tip forces that are
+    constant or one sinusoid, a start in equilibrium, a straight rest line, no swelling, no numerical damping.
+    """
+    tissue, insertion = scene.tissue, scene.insertion
+    if scene.support.kind != "entry" or scene.initial.shape != "equilibrium" or scene.numerics.mesh is not None:
+        return False
+    if tissue.rest_line != "straight" or tissue.tip_stiffness or not isinstance(tissue.stiffness_factor, float):
+        return False
+    if len(tissue.layers) > 1 or any(layer.start > 0.0 or layer.far_side < scene.needle.length for layer in tissue.layers):
+        return False
+    if insertion.kind != "hold" and not (insertion.kind == "speed" and isinstance(insertion.speed, float)):
+        return False
+    if insertion.depth_range(run_duration(scene))[0] < SHALLOWEST * scene.needle.length:
+        return False
+    return _has_simple_loads(scene) and _has_vibrations(scene)
+
+
+def _has_vibrations(scene: Scene) -> bool:
+    """Return whether the model is made of shapes that stretch with the inserted part, moving or at rest without memory."""
+    still = scene.numerics.analysis in {"quasi-static", "static"}
+    if scene.numerics.spectral_radius != 1.0 or (still and any(layer.damping > 0.0 for layer in scene.tissue.layers)):
+        return False
+    model = scene.model
+    stretched = model.kind == "assumed-modes" and model.basis == "inserted-length" and not model.static_corrections
+    return stretched or model.kind == "fem"
+
+
+def _has_simple_loads(scene: Scene) -> bool:
+    varying = 0
+    for load in scene.loads:
+        if not isinstance(load, TipLoad) or isinstance(load.force, Table):
+            return False
+        varying += isinstance(load.force, Sinusoid)
+    return varying <= 1
