@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fem_needle.foundation import Foundation
 from fem_needle.scene import Layer
+from fem_needle.segments import one_layer_holds
 from fem_needle.shapes import IntervalIntegrals
 from fem_needle.table_terms import Block, Multiple, RateRow, Term
 from fem_needle.tables import DAMPING, DRAG, SLIP, TISSUE
@@ -19,10 +20,8 @@ Kind = tuple[int, IntervalIntegrals, Array, Array]  # kind, integrals, factor of
 
 def is_one_layer(foundation: Foundation, depths: Array) -> bool:
     """Return whether one layer holds the whole inserted part at all depths, on shapes that stretch with it: no cut elements."""
-    if len(foundation.layers) != 1 or not foundation.frame.stretch_rate or foundation.tip_stiffness:
-        return False
-    layer = foundation.layers[0]
-    return layer.start <= 0.0 and bool(np.max(depths) <= layer.far_side)
+    stretched = bool(foundation.frame.stretch_rate) and not foundation.tip_stiffness
+    return stretched and one_layer_holds(foundation.layers, float(np.max(depths)))
 
 
 def foundation_terms(foundation: Foundation, depths: Array) -> Iterator[Term]:

@@ -77,6 +77,11 @@ def tip_values(layers: Sequence[Layer], depths: Array, value: Callable[[Layer], 
     return result
 
 
+def one_layer_holds(layers: Sequence[Layer], deepest: float) -> bool:
+    """Return whether there is one layer, and a needle whose tip gets down to ``deepest`` [m] never leaves it."""
+    return len(layers) == 1 and layers[0].start <= 0.0 and deepest <= layers[0].far_side
+
+
 def interfaces(layers: Sequence[Layer]) -> tuple[float, ...]:
     """Return every y [m] at which a layer starts or ends, rising, each once."""
     ends = {layer.far_side for layer in layers} - {float("inf")}

@@ -12,6 +12,7 @@ from fem_needle import banded
 from fem_needle.motion import run_duration
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene, Sinusoid, Table, TipLoad
+from fem_needle.segments import one_layer_holds
 from fem_needle.tables import BENDING, CENTRIFUGAL, CONVECTION, DRAG, MASS
 
 Array = NDArray[np.float64]
@@ -76,7 +77,7 @@ def is_uniform(scene: Scene) -> bool:
         return False
     if tissue.rest_line != "straight" or tissue.tip_stiffness or not isinstance(tissue.stiffness_factor, float):
         return False
-    if len(tissue.layers) > 1 or any(layer.start > 0.0 or layer.far_side < scene.needle.length for layer in tissue.layers):
+    if tissue.layers and not one_layer_holds(tissue.layers, scene.needle.length):
         return False
     if insertion.kind != "hold" and not (insertion.kind == "speed" and isinstance(insertion.speed, float)):
         return False

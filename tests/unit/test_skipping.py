@@ -2,16 +2,16 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from fem_needle import FiniteElementNeedle, banded, simulate
+from fem_needle import FiniteElementNeedle, banded, compiled_march, simulate
 from fem_needle.exact import natural_frequencies
 from fem_needle.free_response import natural_frequencies as computed_frequencies
 from fem_needle.free_response import ringing
 from fem_needle.inertia_effect import inertia_effect
 from fem_needle.motion import shortest_period
 from fem_needle.scene import Guide, Initial, Insertion, Layer, Model, Sinusoid, TipLoad
-from fem_needle.skipping import inertia_free_stepper, unneeded_terms
+from fem_needle.skipping import RULES, inertia_free_stepper, unneeded_terms
 from fem_needle.steppers import DynamicStepper, StaticStepper
-from tests.consistency.scenes import DAMPED, GEL, held, moving, profile, relative, scene_of
+from tests.consistency.scenes import BUZZ, DAMPED, GEL, held, moving, profile, relative, scene_of
 
 
 @pytest.mark.parametrize("kind", ["entry", "hub"])
@@ -114,12 +114,64 @@ def test_a_start_away_from_equilibrium_cannot_do_without_inertia():
 
 def test_unneeded_terms():
     names = [skipped.term for skipped in unneeded_terms(scene_of("entry", held(0.1)))]
-    assert names == ["needle outside the tissue", "tissue viscosity", "swelling", "points between hub and tissue"]
+    assert names == [term for term in RULES if term != "hub motion"]
     full = scene_of(
         "hub",
-        held(0.1),
+        Insertion(kind="force", initial_depth=0.1, push_force=1.0),
         [Layer(foundation_modulus=1e3, damping=1.0)],
-        support={"guides": [Guide(position=-0.01)]},
-        tissue={"stiffness_factor": Sinusoid(mean=1.0, amplitude=0.1, frequency=1.0)},
+        support={"guides": [Guide(position=-0.01)], "hub_angle": Sinusoid(mean=0.0, amplitude=0.1, frequency=1.0)},
+        tissue={"stiffness_factor": Sinusoid(mean=1.0, amplitude=0.1, frequency=1.0), "rest_line": "cut-path"},
     )
     assert list(unneeded_terms(full)) == []
+
+
+HALVES = (Layer(start=0.0, end=0.07, foundation_modulus=5e3), Layer(start=0.07, foundation_modulus=5e3))
+MOVING = {
+    kind: scene_of(kind, moving(1.0, 0.06, 0.09), loads=[TipLoad(force=BUZZ)], duration=0.03) for kind in ("entry", "hub")
+}
+# A term: the scene that does without it, and what puts the term in without any effect.
+TWINS = {
+    "needle outside the tissue": ("entry", {"needle.length": 0.4}),
+    "tissue viscosity": ("entry", {"tissue.layers.0.damping": 1e-9}),
+    "swelling": ("hub", {"tissue.stiffness_factor": {"time": [0.0, 1.0], "value": [1.0, 1.0]}}),
+    "points between hub and tissue": (
+        "hub", {"loads": [{"kind": "tip", "force": BUZZ.model_dump()}, {"kind": "lateral", "position": -0.01, "force": 0.0}]}
+    ),
+    "layer loop": ("entry", {"tissue.layers": [layer.model_dump() for layer in HALVES]}),
+    "path memory": ("hub", {"tissue.rest_line": "cut-path", "insertion": {"kind": "hold", "initial_depth": 0.08}}),
+    "hub motion": ("hub", {"support.hub_deflection": {"time": [0.0, 1.0], "value": [0.0, 1e-15]}}),
+}
+
+
+@pytest.mark.parametrize("term", TWINS)
+def test_what_is_left_out_changes_nothing(term):
+    """The same needle with the term in it, but without effect: the tips agree far below any tolerance."""
+    kind, values = TWINS[term]
+    lean = MOVING[kind]
+    if term == "path memory":  # no path is cut while the needle is held
+        lean = lean.with_value("insertion", values["insertion"])
+    full = lean.with_values(values)
+    assert RULES[term](lean)
+    if term != "needle outside the tissue":
+        assert not RULES[term](full)
+    tips = [
+        simulate(FiniteElementNeedle(scene, elements=12), analysis="dynamic", time_step=1e-4, output_step=1e-3).tip_deflection
+        for scene in (lean, full)
+    ]
+    assert relative(*tips) < 1e-6
+
+
+def test_every_rule_has_its_test():
+    assert set(RULES) - set(TWINS) == {"insertion dynamics"}  # a push is another scene: tests/consistency/test_push.py
+
+
+def test_output_is_made_where_it_is_asked_for(monkeypatch):
+    """Samples between the outputs are not computed: fewer outputs, fewer of them."""
+    counted = []
+    original = compiled_march._sample
+    monkeypatch.setattr(compiled_march, "_sample", lambda *args: counted.append(1) or original(*args))
+    plant = FiniteElementNeedle(MOVING["entry"].with_value("numerics.loop", "compiled"), elements=4)
+    for output_step, samples in ((1e-2, 4), (1e-3, 31)):
+        counted.clear()
+        run = simulate(plant, analysis="dynamic", time_step=1e-3, output_step=output_step)
+        assert len(counted) == len(run.time) == samples
