@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
 from itertools import pairwise
 from math import log2
 from statistics import median
@@ -16,6 +15,7 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.batch.many import simulate_many
 from fem_needle.benchmark.cases import Case, cases_of
 from fem_needle.benchmark.loop import whole_loop, whole_run
 from fem_needle.benchmark.methods import Setting
@@ -32,7 +32,8 @@ Array = NDArray[np.float64]
 ELEMENTS, STEP = 40, 5e-4  # s
 ROUNDS = 3
 HIT_RATE = 99.0  # %
-BATCH = 10_000
+BATCH, FEW = 10_000, 8
+MODULUS = "tissue.layers.0.foundation_modulus"
 PROCESS_ROUNDS = 5
 MICROSECONDS = 1e6
 
@@ -181,17 +182,15 @@ def time_of_command(*arguments: str) -> Measured:
 def batch_efficiency() -> Measured:
     """Return the efficiency of a batch on two cores: time on one / twice the time on two [%].
 
-    Raises
-    ------
-    NeedleError
-        As long as the program has no batch.
+    The batch is case M with 10 000 foundation moduli.
     """
-    simulate_many = getattr(import_module("fem_needle"), "simulate_many", None)
-    if simulate_many is None:
-        raise NeedleError("there is no simulate_many")
-    scene = _case("M").scene.with_values({"numerics.elements": 8, "numerics.time_step": 1e-2})
+    scene = _case("M").scene
     moduli = np.linspace(300.0, 800.0, BATCH)
-    scenes = [scene.with_value("tissue.layers.0.foundation_modulus", float(modulus)) for modulus in moduli]
-    simulate_many(scenes[:8])
-    one, two = (seconds(lambda cores=cores: simulate_many(scenes, cores=cores)) for cores in (1, 2))  # type: ignore[misc]
+
+    def run(count: int, cores: int) -> float:
+        return seconds(lambda: simulate_many(scene, {MODULUS: moduli[:count]}, time_step=1e-2, cores=cores))
+
+    for cores in (1, 2):
+        run(FEW, cores)  # compiles
+    one, two = run(BATCH, 1), run(BATCH, 2)
     return Measured(100.0 * one / (2 * two), f"{BATCH} runs: {one:.3g} s on one core, {two:.3g} s on two")

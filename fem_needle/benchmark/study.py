@@ -133,6 +133,9 @@ def _timed(case: Case, entries: Sequence[_Entry], repeats: int, tell: Callable[[
     timings = take_turns([solve for _, solve in turns], [entry.first for entry, _ in turns], repeats)
     rows = {id(entry): entry.row for entry in entries}
     for (entry, _), timing in zip(turns, timings, strict=True):
+        if timing is None:
+            rows[id(entry)] = replace(entry.row, error=None, note="stopped in its turn")
+            continue
         times = {"median": timing.median, "lowest": timing.lowest, "highest": timing.highest, "rounds": timing.rounds}
         rows[id(entry)] = replace(entry.row, **times, whole=_whole(case, entry, timing.median))  # type: ignore[arg-type]
     return list(rows.values())
@@ -143,4 +146,7 @@ def _whole(case: Case, entry: _Entry, time: float) -> float | None:
     call = entry.method.whole(case, entry.setting)
     if call is None or time > SLOW:
         return None
-    return seconds(call)
+    try:
+        return seconds(call)
+    except NeedleError:
+        return None

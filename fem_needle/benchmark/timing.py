@@ -9,6 +9,8 @@ from math import ceil
 from statistics import median
 from typing import Any
 
+from fem_needle.errors import NeedleError
+
 SHORTEST = 2e-3  # s: a shorter call is repeated until that much time has gone by
 SLOW = 1.0  # s: a longer call is timed in few rounds
 SLOW_ROUNDS = 2
@@ -40,7 +42,7 @@ def seconds(call: Callable[[], Any], count: int = 1) -> float:
     return (clock.perf_counter() - started) / count
 
 
-def take_turns(calls: Sequence[Callable[[], Any]], first: Sequence[float], rounds: int) -> list[Timing]:
+def take_turns(calls: Sequence[Callable[[], Any]], first: Sequence[float], rounds: int) -> list[Timing | None]:
     """Time calls in rounds, each once a round.
 
     Parameters
@@ -51,13 +53,22 @@ def take_turns(calls: Sequence[Callable[[], Any]], first: Sequence[float], round
         How long that took [s], loading and compiling included.
     rounds
         At least 1; of a call longer than `SLOW`, `SLOW_ROUNDS` are enough.
+
+    Returns
+    -------
+    list of Timing
+        One for each call; None of one that failed in its first round. After a failure a call has no more turns.
     """
     found: list[list[float]] = [[] for _ in calls]
+    stopped: set[int] = set()
     for _ in range(rounds):
-        for times, call, before in zip(found, calls, first, strict=True):
-            if len(times) < SLOW_ROUNDS or min(times) <= SLOW:
-                times.append(seconds(call, _enough(before, times)))
-    return [Timing(median(times), min(times), max(times), len(times)) for times in found]
+        for index, (times, call, before) in enumerate(zip(found, calls, first, strict=True)):
+            if index not in stopped and (len(times) < SLOW_ROUNDS or min(times) <= SLOW):
+                try:
+                    times.append(seconds(call, _enough(before, times)))
+                except NeedleError:
+                    stopped.add(index)
+    return [Timing(median(times), min(times), max(times), len(times)) if times else None for times in found]
 
 
 def _enough(first: float, times: Sequence[float]) -> int:

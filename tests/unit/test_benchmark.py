@@ -167,6 +167,14 @@ def test_a_first_call_that_compiles_does_not_count():
     assert (timing.rounds, timing.highest < 1.0) == (4, True)
 
 
+def test_a_call_that_fails_in_its_turn_stops_no_other():
+    def fail():
+        raise NeedleError("too slow")
+
+    failed, timed = take_turns([fail, lambda: sleep(SHORTEST)], [0.1, 0.1], rounds=3)
+    assert (failed, timed.rounds) == (None, 3)
+
+
 def test_after_a_failure_nothing_finer_is_tried():
     true = reference_tips(S)
     study = benchmark([S], [Given([1.1 * true, None, true])], repeats=2)
