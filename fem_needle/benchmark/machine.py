@@ -14,7 +14,7 @@ THREADS = "OPENBLAS_NUM_THREADS"
 
 
 def machine(rivals: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return processor, cores, threads of BLAS, versions of Python and packages; None where something is unknown.
+    """Return processor, cores, load (runnable processes, mean of a minute), threads of BLAS, versions of Python and packages; None where something is unknown.
 
     Parameters
     ----------
@@ -24,6 +24,7 @@ def machine(rivals: tuple[str, ...] = ()) -> dict[str, Any]:
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
+        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
         "system": f"{platform.system()} {platform.machine()}",
         "blas_threads": os.environ.get(THREADS),
         "python": platform.python_version(),
