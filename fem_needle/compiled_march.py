@@ -1,104 +1,37 @@
-"""The loop over time with all steps from one landing to the next in one compiled call (`fem_needle.march` steps in Python)."""
+"""The loop over time with all steps of a leg in one compiled call (`fem_needle.march` steps in Python)."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
-from dataclasses import dataclass, fields
-from typing import Any
+from collections.abc import Generator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle import axial
 from fem_needle.compiled.arguments import NodeCourse, arguments, at_nodes
 from fem_needle.compiled.loop import run_steps
 from fem_needle.compiled.notice import announced
 from fem_needle.course import Instants, instants_of
-from fem_needle.initial import initial_state
-from fem_needle.ledger import StepEnd, Works
-from fem_needle.leg import Leg, momenta_of, point_forces_of
-from fem_needle.leg_matrices import LegMatrices
-from fem_needle.leg_works import figures, leg_works, row_corrections
-from fem_needle.loads import LoadCase
-from fem_needle.march import RunEnd, TimeGrid, ends_by_itself, failed_step, pass_landing
-from fem_needle.motion import DepthLaw, Instant, depth_law
+from fem_needle.ledger import StepEnd
+from fem_needle.leg import Leg, momenta_of, point_forces_of, woven
+from fem_needle.leg_march import Piece, march_legs, pieces_of
+from fem_needle.leg_matrices import LegMatrices, without
+from fem_needle.march import RunEnd, TimeGrid
+from fem_needle.motion import DepthLaw
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample
-from fem_needle.scene import Scene
-from fem_needle.stages import StageSolution, evaluate_stage
 from fem_needle.steppers import DynamicStepper
-from fem_needle.tables import ABSENT, CENTRIFUGAL, CONVECTION, MASS, OperatorTable
+from fem_needle.tables import CENTRIFUGAL, CONVECTION, MASS, OperatorTable
 
 Array = NDArray[np.float64]
 
-MOST_STEPS = 500  # of one call: their tables stay in the tens of megabytes
-
-
-@dataclass(frozen=True, eq=False)
-class _Piece:
-    """Steps of one call: their times (steps + 1,), which ends are outputs, and whether the first step follows a landing."""
-
-    times: Array
-    is_output: NDArray[np.bool_]
-    landed: bool
-
 
 def compiled_march(plant: Plant, stepper: DynamicStepper, grid: TimeGrid) -> Generator[Sample, None, RunEnd]:
-    """Yield a sample at each output time, as `fem_needle.march.march` does.
-
-    Raises
-    ------
-    ComputationError
-        If a step cannot be solved or gives numbers that are not finite; says at which time and depth.
-    """
-    law = depth_law(plant.scene)
-    state, works, last_length, pending = initial_state(stepper.plant, law), Works(), 0.0, 0.0
-    deepest = law.depth(0.0)
-    for piece in _pieces(grid):
-        time, length = float(piece.times[0]), float(piece.times[1] - piece.times[0])
-        if piece.landed:
-            state, work = pass_landing(plant, stepper, law, state, time, float(piece.times[1]))
-            works, last_length = (works if time == 0.0 else works + work), 0.0
-        if abs(last_length - length) > 1e-9 * length:  # a row of equal steps has ended
-            works = works + Works(boundary_energy=pending)
-        leg, done = _computed(plant, stepper, law, piece, state)
-        if done:
-            gained = _all_works(plant.scene, leg, last_length, deepest)
-            yield from _samples(plant, law, piece, leg, works, gained, deepest)
-        if done < len(piece.is_output):
-            failed = float(piece.times[done])
-            raise failed_step(failed, law.depth(failed), "the equations have no finite answer")
-        works = works + _works_at(gained, -1)
-        deepest = max(deepest, float(np.max(leg.instants.depths[leg.ends])))
-        pending = float(row_corrections(leg, np.array([done - 1]), at_start=False)[0])
-        last_length, state = float(leg.lengths[-1]), _end_of(stepper, leg)
-    return RunEnd("final-depth" if ends_by_itself(plant.scene) else "duration", grid.steps)
+    """Return the generator of the samples, as `fem_needle.march.march` does."""
+    return march_legs(plant, stepper, pieces_of(grid), partial(_computed, plant, stepper), grid.steps)
 
 
-def _pieces(grid: TimeGrid) -> Iterator[_Piece]:
-    """Cut the grid at its landings, and long stretches between them."""
-    outputs, landings = set(grid.outputs), {0.0, *grid.landings}
-    times: list[float] = []
-    shown: list[bool] = []
-    landed = True
-    for start, end, count in grid.intervals():
-        if start in landings and shown:
-            yield _Piece(np.array(times), np.array(shown), landed)
-            times, shown, landed = [], [], True
-        marks = np.linspace(start, end, count + 1).tolist()
-        marks[-1] = end
-        times = times or [start]
-        for number, mark in enumerate(marks[1:], start=1):
-            times.append(mark)
-            shown.append(number == count and end in outputs)
-            if len(shown) == MOST_STEPS:
-                yield _Piece(np.array(times), np.array(shown), landed)
-                times, shown, landed = [mark], [], False
-    if shown:
-        yield _Piece(np.array(times), np.array(shown), landed)
-
-
-def _computed(plant: Plant, stepper: DynamicStepper, law: DepthLaw, piece: _Piece, start: StepEnd) -> tuple[Leg, int]:
+def _computed(plant: Plant, stepper: DynamicStepper, law: DepthLaw, piece: Piece, start: StepEnd) -> tuple[Leg, int]:
     """Compute a piece; returns its states as far as they are finite and the number of steps done."""
     instants = instants_of(plant, law, stepper.method, piece.times, start.stage)
     table = plant.table(instants.depths)
@@ -132,14 +65,10 @@ def _leg(
     kept: tuple[Array, Array, Array],
 ) -> Leg:
     """Put the states of the steps together with what follows from them: velocities, momenta, forces."""
-    matrices = table.matrices
-    if not stepper.inertia:
-        base_of = matrices.base_of.copy()
-        base_of[[MASS, CONVECTION, CENTRIFUGAL]] = ABSENT
-        matrices = matrices._replace(base_of=base_of)
+    matrices = table.matrices if stepper.inertia else without(table.matrices, (MASS, CONVECTION, CENTRIFUGAL))
     known, method, reader = start.solution, stepper.method, LegMatrices(matrices)
     stages, ends, guide_forces = kept
-    coordinates = _woven(known.coordinates, stages, ends[:, 0])
+    coordinates = woven(known.coordinates, stages, ends[:, 0])
     begun = coordinates[:-1:3, None]
     node_rates = np.einsum("ij,tjn->tin", method.inverse, stages - begun) / lengths[:, None, None]
     clamped, nodes, at_ends = plant.prescribed, slice(None), 3 * np.arange(1, len(lengths) + 1)
@@ -151,102 +80,6 @@ def _leg(
         end_rates[:, clamped:] = reader.solve_mass(at_ends, clamped, (ends[:, 1] - known_momenta)[:, clamped:])
     return Leg(
         *(reader, table.rates, table.points, instants, method, stepper.inertia, lengths, coordinates),
-        _woven(known.velocities, node_rates, end_rates),
+        woven(known.velocities, node_rates, end_rates),
         point_forces_of(table.points, instants, method, coordinates, guide_forces, known.forces),
-    )
-
-
-def _woven(start: Array, stages: Array, ends: Array) -> Array:
-    """Return values at all instants from those at the start (n,), the stages (steps, 2, n) and the ends (steps, n)."""
-    steps = np.concatenate([stages, ends[:, None]], axis=1)
-    return np.concatenate([start[None], steps.reshape(-1, len(start))])
-
-
-def _end_of(stepper: DynamicStepper, leg: Leg) -> StepEnd:
-    """Return the state at the end of a leg, as a step leaves it."""
-    instants, last = leg.instants, np.array([len(leg.coordinates) - 1])
-    motion = (instants.times, instants.depths, instants.speeds, instants.accelerations)
-    case = LoadCase(*(getattr(instants.loads, field.name)[-1] for field in fields(LoadCase)))
-    stage = evaluate_stage(stepper.plant, Instant(*(float(part[-1]) for part in motion)), case)
-    momentum = leg.momenta(last)[0] if leg.inertia else np.zeros_like(leg.coordinates[-1])
-    return StepEnd(stage, StageSolution(leg.coordinates[-1], leg.velocities[-1], momentum, leg.forces[-1]))
-
-
-def _deepest(leg: Leg, before: float) -> Array:
-    """Return the largest depth so far [m] at the start of a leg and after every step (steps + 1,)."""
-    return np.maximum.accumulate(np.maximum(leg.instants.depths[leg.ends], before))
-
-
-def _all_works(scene: Scene, leg: Leg, last_length: float, deepest: float) -> dict[str, Array]:
-    """Return the works by name since the start of a leg, at its start and after every step (steps + 1,) [J]."""
-    before = np.append(last_length, leg.lengths[:-1])
-    starts_row = np.append(np.abs(before - leg.lengths) > 1e-9 * leg.lengths, False)
-    works = leg_works(leg, starts_row)
-    depths, speeds = leg.instants.depths[leg.nodes], leg.instants.speeds[leg.nodes]
-    weights = leg.method.weights * leg.lengths[:, None] * speeds
-    friction = np.sum(weights * axial.friction_force(scene, depths, speeds), axis=1)
-    cutting = np.sum(weights * axial.cutting_forces(scene, depths, speeds, _deepest(leg, deepest)[:-1, None]), axis=1)
-    return {field.name: getattr(works, field.name) for field in fields(works)} | {
-        "friction_dissipation": np.append(0.0, np.cumsum(friction)),
-        "cutting_work": np.append(0.0, np.cumsum(cutting)),
-    }
-
-
-def _works_at(gained: dict[str, Array], step: int) -> Works:
-    return Works(**{name: float(values[step]) for name, values in gained.items()})
-
-
-def _samples(
-    plant: Plant, law: DepthLaw, piece: _Piece, leg: Leg, works: Works, gained: dict[str, Array], deepest: float
-) -> Iterator[Sample]:
-    """Yield the samples of a leg, that of its start only at the start of the run."""
-    done = np.flatnonzero(piece.is_output[: len(leg.lengths)]) + 1  # steps done at each output
-    if piece.landed and piece.times[0] == 0.0:
-        done = np.append(0, done)
-    if not len(done):
-        return
-    shown = figures(leg, 3 * done, plant.deflection_at_one)
-    ending = row_corrections(leg, np.maximum(done - 1, 0), at_start=False) * (done > 0)
-    deepest_yet, depths = _deepest(leg, deepest)[done], law.depths(piece.times[done])
-    means = leg.guide_means(done)
-    for row, steps in enumerate(done.tolist()):
-        total = works + _works_at(gained, steps) + Works(boundary_energy=float(ending[row]))
-        values = {field.name: getattr(shown, field.name)[row] for field in fields(shown)}
-        yield _sample(plant, leg, 3 * steps, values, total, float(depths[row]), float(deepest_yet[row]), means[row])
-
-
-def _sample(
-    plant: Plant,
-    leg: Leg,
-    instant: int,
-    shown: dict[str, Any],
-    works: Works,
-    depth: float,
-    deepest: float,
-    guide_force: Array,
-) -> Sample:
-    """Return the sample of an instant."""
-    instants, scene = leg.instants, plant.scene
-    speed, mass = float(instants.speeds[instant]), scene.needle.mass_per_length * scene.needle.length
-    friction = float(axial.friction_force(scene, depth, speed))
-    resisting = friction + axial.cutting_force(scene, depth, speed, deepest)
-    axial_force = float(shown["axial_force"]) if plant.axial_force_acts else 0.0
-    hub_force, hub_moment = plant.clamp_reactions(shown["hub_residual"], float(instants.depths[instant]))
-    return Sample(
-        time=float(instants.times[instant]),
-        depth=depth,
-        speed=speed,
-        coordinates=leg.coordinates[instant].copy(),
-        point_forces=leg.forces[instant].copy(),
-        guide_force=guide_force,
-        push_force=mass * float(instants.accelerations[instant]) + resisting - axial_force,
-        friction_force=friction,
-        tissue_force=float(shown["tissue_force"]),
-        hub_force=hub_force,
-        hub_moment=hub_moment,
-        axial_kinetic_energy=0.5 * mass * speed**2,
-        path_position=np.zeros(0),
-        path_deflection=np.zeros(0),
-        **{name: float(value) for name, value in shown.items() if name.endswith("_energy")},
-        **{field.name: float(getattr(works, field.name)) for field in fields(works)},
     )

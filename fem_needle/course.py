@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Instants:
-    """The start of the first step, and nodes and end of each (T = 3 steps + 1).
+    """The start of the first step, and nodes and end of each (T = (nodes + 1) steps + 1).
 
     Attributes
     ----------
@@ -60,15 +60,16 @@ def instants_of(plant: Plant, law: DepthLaw, method: Collocation, times: Array, 
     nodes = np.where(method.nodes == 1.0, ends, begins + method.nodes * (ends - begins))
     where = np.concatenate([nodes, ends], axis=1).ravel()
     before = np.tile(np.append(method.nodes == 1.0, True), len(begins))  # at the end of a step: its left side
-    middles = np.repeat(law.depths(0.5 * (begins + ends).ravel()), 3)
+    stride = len(method.nodes) + 1
+    middles = np.repeat(law.depths(0.5 * (begins + ends).ravel()), stride)
     rated = np.where(before, np.nextafter(where, -np.inf), where)
     depths = law.depths(where)
     depths = np.where(before, all_one_sided(plant.scene.tissue.layers, depths, middles), depths)
-    known = np.minimum(where, np.repeat(np.nextafter(ends, begins).ravel(), 3))
+    known = np.minimum(where, np.repeat(np.nextafter(ends, begins).ravel(), stride))
     loads = load_cases(plant.scene, middles, known)
     swelling = as_function(plant.scene.tissue.stiffness_factor)
     # A node at the end belongs to its step, the end itself to what follows.
-    swollen = np.where(np.tile([True, True, False], len(begins)), known, where)
+    swollen = np.where(np.tile(np.arange(stride) < stride - 1, len(begins)), known, where)
     case = start.case
     return Instants(
         np.append(start.instant.time, where),

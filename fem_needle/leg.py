@@ -1,6 +1,6 @@
 """A leg of a run, all its steps in arrays: states at the nodes and ends, energies, works, reactions (`fem_needle.ledger`).
 
-Instant 0 is the start; step i has its nodes at 3 i + 1 and 3 i + 2 and its end at 3 i + 3.
+Instant 0 is the start; with s nodes to a step, step i has them at (s + 1) i + 1, ..., and its end at (s + 1) (i + 1).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """States over a leg, ``T = 3 steps + 1`` instants.
+    """States over a leg, ``T = stride steps + 1`` instants.
 
     Attributes
     ----------
@@ -59,14 +59,19 @@ class Leg:
     forces: Array
 
     @property
+    def stride(self) -> int:
+        """Instants of a step: its nodes and its end."""
+        return len(self.method.nodes) + 1
+
+    @property
     def nodes(self) -> Indices:
-        """Instants of the nodes (steps, 2)."""
-        return 3 * np.arange(len(self.lengths))[:, None] + np.array([1, 2])
+        """Instants of the nodes (steps, s)."""
+        return self.stride * np.arange(len(self.lengths))[:, None] + np.arange(1, self.stride)
 
     @property
     def ends(self) -> Indices:
         """Instants of the start and of every end (steps + 1,)."""
-        return 3 * np.arange(len(self.lengths) + 1)
+        return self.stride * np.arange(len(self.lengths) + 1)
 
     @cached_property
     def moves(self) -> bool:
@@ -84,7 +89,7 @@ class Leg:
     def guide_means(self, done: Indices) -> Array:
         """Return what is shown of the guides' forces after so many steps: a rigid one's mean over the last step."""
         points, guides = self.points, self.points.guides
-        forces = self.forces[3 * done, :guides]
+        forces = self.forces[self.stride * done, :guides]
         nodes = self.forces[self.nodes[np.maximum(done - 1, 0)], :guides]
         means = np.einsum("s,tsg->tg", self.method.weights, nodes)
         return np.where(points.guide_compliance > 0.0, forces, means)
@@ -161,17 +166,28 @@ class Leg:
 
     def point_forces(self, at: Indices) -> Array:
         """Return N^T P (instants, n)."""
-        points, result = self.points, np.zeros((len(at), self.coordinates.shape[1]))
-        entries = points.rows[at] * self.forces[at][:, :, None]
-        columns = points.first[at][:, :, None] + np.arange(points.rows.shape[2])
-        np.add.at(result, (np.arange(len(at))[:, None, None], columns), entries)
-        return result
+        points = self.points
+        return scattered(points.first[at], points.rows[at], self.forces[at], self.coordinates.shape[1])
+
+
+def scattered(first: Indices, rows: Array, forces: Array, size: int) -> Array:
+    """Return the sum of force times row (T, size) of forces (T, p) at points."""
+    result, everywhere = np.zeros((len(forces), size)), np.arange(len(forces))[:, None, None]
+    columns = first[:, :, None] + np.arange(rows.shape[2])
+    np.add.at(result, (everywhere, columns), rows * forces[:, :, None])
+    return result
 
 
 def gathered(first: Indices, rows: Array, vectors: Array) -> Array:
     """Return row . x of rows (T, p, m) that begin at the coordinates ``first`` (T, p), for vectors (T, n)."""
     columns = first[:, :, None] + np.arange(rows.shape[2])
     return np.asarray(np.einsum("tpm,tpm->tp", rows, vectors[np.arange(len(vectors))[:, None, None], columns]))
+
+
+def woven(start: Array, stages: Array, ends: Array) -> Array:
+    """Return values at all instants from those at the start (n,), the stages (steps, s, n) and the ends (steps, n)."""
+    steps = np.concatenate([stages, ends[:, None]], axis=1)
+    return np.concatenate([start[None], steps.reshape(-1, len(start))])
 
 
 def momenta_of(matrices: LegMatrices, instants: Instants, at: Indices, coordinates: Array, velocities: Array) -> Array:
@@ -188,13 +204,14 @@ def point_forces_of(
     At the end of a step N q + B P + compliance R = 0 for all guides together, except those that hardly give way: the mean over
     the step, about which the values at the nodes alternate.
     """
-    guides, ends = points.guides, 3 * np.arange(1, len(guide_forces) + 1)
+    guides, stride = points.guides, len(method.nodes) + 1
+    ends = stride * np.arange(1, len(guide_forces) + 1)
     forces = np.zeros((len(coordinates), points.rows.shape[1]))
     forces[:, guides:] = instants.loads.forces
     forces[0] = start
     if not guides:
         return forces
-    forces[1:].reshape(-1, 3, forces.shape[1])[:, :2, :guides] = guide_forces
+    forces[1:].reshape(-1, stride, forces.shape[1])[:, :-1, :guides] = guide_forces
     compliance = points.flexibility[ends, :guides, :guides] + np.diag(points.guide_compliance)
     gaps = -gathered(points.first[ends, :guides], points.rows[ends, :guides], coordinates[ends])
     gaps -= np.einsum("tgl,tl->tg", points.flexibility[ends, :guides, guides:], forces[ends, guides:])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -73,8 +74,10 @@ class LegMatrices:
         return np.asarray(np.einsum("ti,ti->t", left, self.product(kind, at, right)))
 
     def bands(self, kind: int, at: Indices) -> Array:
-        """Return a sum of ranges and blocks in band storage (instants, 2 b + 1, n)."""
-        matrices = self.matrices
+        """Return a kind in band storage (instants, 2 b + 1, n)."""
+        matrices, base = self.matrices, self.matrices.base_of[kind]
+        if base >= 0:
+            return matrices.bases[base] * matrices.scale[at, kind][:, None, None]
         rows, size = matrices.bases.shape[1:]
         result = np.zeros((len(at), rows, size))
         for number in np.flatnonzero(matrices.range_kind == kind):
@@ -115,3 +118,10 @@ class LegMatrices:
     def _mass_factors(self, clamped: int) -> banded.Factorization:
         base = self.matrices.bases[self.matrices.base_of[MASS]]
         return banded.Factorization(banded.trailing(np.asfortranarray(base), clamped))
+
+
+def without(matrices: Matrices, kinds: Sequence[int]) -> Matrices:
+    """Return matrices of a plant that lacks some kinds."""
+    base_of = matrices.base_of.copy()
+    base_of[list(kinds)] = ABSENT
+    return matrices._replace(base_of=base_of)

@@ -52,7 +52,7 @@ def _since_start(steps: Array) -> Array:
 
 def _node_sums(leg: Leg, power: Callable[[Indices], Array]) -> Array:
     """Return the integral of a power over every step by the method's own quadrature."""
-    values = power(leg.nodes.ravel()).reshape(-1, 2)
+    values = power(leg.nodes.ravel()).reshape(leg.nodes.shape)
     return np.asarray(leg.lengths * (values @ leg.method.weights))
 
 
@@ -116,8 +116,8 @@ def row_corrections(leg: Leg, steps: Indices, *, at_start: bool) -> Array:
     """Return what the first or the last step of a row of equal steps adds to the trapezoidal rule of the boundary energy."""
     if not (leg.inertia and leg.moves):
         return np.zeros(len(steps))
-    at = 3 * steps[:, None] + np.arange(4)
-    slopes = moving_powers(leg, at.ravel()).reshape(-1, 4) @ leg.method.power_slopes[0 if at_start else 1]
+    at = leg.stride * steps[:, None] + np.arange(leg.stride + 1)
+    slopes = moving_powers(leg, at.ravel()).reshape(at.shape) @ leg.method.power_slopes[0 if at_start else 1]
     return leg.lengths[steps] / 12 * (slopes if at_start else -slopes)
 
 
@@ -136,21 +136,21 @@ class Figures:
 
 def figures(leg: Leg, at: Indices, one: Array) -> Figures:
     """Return figures at the start (instant 0, by the first step's polynomial) or at ends of steps; one: the function 1 (n,)."""
-    steps = np.maximum(at // 3 - 1, 0)
+    steps = np.maximum(at // leg.stride - 1, 0)
     slopes = np.where((at == 0)[:, None], leg.method.start_slope, leg.method.end_slope) / leg.lengths[steps][:, None]
     own = leg.velocities[at]
-    velocities = own if leg.inertia else _slopes(leg.coordinates[_polynomial_instants(steps)], slopes)
+    velocities = own if leg.inertia else _slopes(leg.coordinates[_polynomial_instants(leg, steps)], slopes)
     needed = -leg.internal_forces(at, velocities) - leg.point_forces(at)
     axial = leg.energy_forces(at) + leg.contact_forces(at)
     if leg.inertia:
-        needed += _slopes(leg.momenta(_polynomial_instants(steps).ravel()).reshape(len(at), 3, -1), slopes)
-        values = leg.axial_momenta(_polynomial_instants(steps).ravel()).reshape(-1, 3)
+        needed += _slopes(leg.momenta(_polynomial_instants(leg, steps).ravel()).reshape(len(at), leg.stride, -1), slopes)
+        values = leg.axial_momenta(_polynomial_instants(leg, steps).ravel()).reshape(len(at), -1)
         axial -= np.einsum("ts,ts->t", slopes, values[:, 1:] - values[:, :1])
     return Figures(*_energies(leg, at), axial, needed[:, :2], -leg.tissue_forces(at, velocities) @ one)
 
 
-def _polynomial_instants(steps: Indices) -> Indices:
-    return 3 * steps[:, None] + np.arange(3)
+def _polynomial_instants(leg: Leg, steps: Indices) -> Indices:
+    return leg.stride * steps[:, None] + np.arange(leg.stride)
 
 
 def _slopes(found: Array, slopes: Array) -> Array:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Generator
 from importlib.util import find_spec
 
+from fem_needle.equilibrium_march import equilibrium_march
 from fem_needle.errors import SceneError
 from fem_needle.march import RunEnd, TimeGrid, march
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import march_pushed
 from fem_needle.samples import Sample
-from fem_needle.steppers import DynamicStepper, Stepper
+from fem_needle.steppers import DynamicStepper, StaticStepper, Stepper
 
 FEWEST_STEPS = 300  # fewer take no longer in numpy than the compiled loop takes to load
 
@@ -27,6 +28,8 @@ def run_loop(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample
         if plant.scene.numerics.loop == "compiled":
             raise _refused("a push decides its motion step by step")
         return march_pushed(plant, stepper, grid)
+    if isinstance(stepper, StaticStepper) and plant.has_table and plant.scene.numerics.loop == "auto":
+        return equilibrium_march(plant, stepper, grid)
     if is_compiled(plant, stepper, grid) and isinstance(stepper, DynamicStepper):
         from fem_needle.compiled_march import compiled_march
 

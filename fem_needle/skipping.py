@@ -28,7 +28,7 @@ def inertia_free_stepper(plant: Plant) -> Stepper:
     remembers = tissue.rest_line == "cut-path" or plant.scene.insertion.kind == "force"
     if remembers or any(layer.damping > 0 for layer in tissue.layers):
         return DynamicStepper(Massless(plant), collocation(0.0), inertia=False)
-    return StaticStepper(plant)
+    return StaticStepper(Massless(plant))
 
 
 Rule = Callable[[Scene], str]  # why a scene does not need a term, "" where it does

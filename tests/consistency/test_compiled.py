@@ -8,10 +8,11 @@ import pytest
 from fem_needle import FiniteElementNeedle, SceneError, simulate
 from fem_needle.collocation import collocation
 from fem_needle.compiled_march import compiled_march
+from fem_needle.equilibrium_march import equilibrium_march
 from fem_needle.errors import ComputationError
 from fem_needle.march import march, time_grid
 from fem_needle.scene import Guide, LateralLoad, Sinusoid, Table, TipLoad
-from fem_needle.steppers import DynamicStepper, Massless
+from fem_needle.steppers import DynamicStepper, Inviscid, Massless, StaticStepper
 from reduced_model import AssumedModeNeedle
 from tests.consistency.scenes import BUZZ, DAMPED, LAYERS, held, moving, profile, scene_of
 
@@ -54,8 +55,8 @@ def samples(generator):
             return found, finished.value
 
 
-def assert_same(plant, stepper, grid):
-    (expected, end), (found, found_end) = samples(march(plant, stepper, grid)), samples(compiled_march(plant, stepper, grid))
+def assert_same(plant, stepper, grid, loop=compiled_march):
+    (expected, end), (found, found_end) = samples(march(plant, stepper, grid)), samples(loop(plant, stepper, grid))
     assert found_end == end
     assert len(found) == len(expected) > 5
     for field in fields(expected[0]):
@@ -71,6 +72,19 @@ def test_finite_elements(name, inertia):
     model = plant if inertia else Massless(plant)
     stepper = DynamicStepper(model, collocation(1.0 if inertia else 0.0), inertia=inertia)
     assert_same(plant, stepper, time_grid(plant, SCENES[name].duration / 60, SCENES[name].duration / 9))
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "free-hub"])
+def test_equilibria(name):
+    plant = FiniteElementNeedle(SCENES[name], elements=7)
+    grid = time_grid(plant, SCENES[name].duration / 20, SCENES[name].duration / 9)
+    assert_same(plant, StaticStepper(Inviscid(plant)), grid, equilibrium_march)
+
+
+def test_equilibria_out_of_the_tissue_and_in_again():
+    scene = scene_of("entry", profile([0.0, 0.01, 0.02, 0.03], [0.02, 0.0, 0.0, 0.03]), duration=0.03)
+    plant = FiniteElementNeedle(scene, elements=4)
+    assert_same(plant, StaticStepper(Massless(plant)), time_grid(plant, 5e-4, 1e-3), equilibrium_march)
 
 
 @pytest.mark.parametrize("basis", ["full-length", "inserted-length"])
