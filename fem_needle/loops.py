@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Generator
 from importlib.util import find_spec
 
-from fem_needle.equilibrium_march import equilibrium_march
 from fem_needle.errors import SceneError
+from fem_needle.legs.equilibria import equilibrium_march
+from fem_needle.legs.vibrations import modal_march
 from fem_needle.march import RunEnd, TimeGrid, march
+from fem_needle.modal_stepper import ModalStepper
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import march_pushed
 from fem_needle.samples import Sample
@@ -28,10 +30,13 @@ def run_loop(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample
         if plant.scene.numerics.loop == "compiled":
             raise _refused("a push decides its motion step by step")
         return march_pushed(plant, stepper, grid)
-    if isinstance(stepper, StaticStepper) and plant.has_table and plant.scene.numerics.loop == "auto":
-        return equilibrium_march(plant, stepper, grid)
+    if plant.has_table and plant.scene.numerics.loop == "auto":
+        if isinstance(stepper, StaticStepper):
+            return equilibrium_march(plant, stepper, grid)
+        if isinstance(stepper, ModalStepper):
+            return modal_march(plant, stepper, grid)
     if is_compiled(plant, stepper, grid) and isinstance(stepper, DynamicStepper):
-        from fem_needle.compiled_march import compiled_march
+        from fem_needle.legs.compiled import compiled_march
 
         return compiled_march(plant, stepper, grid)
     return march(plant, stepper, grid)

@@ -96,6 +96,18 @@ class Vibration:
         return StepEnd(stage, StageSolution(coordinates, velocities, momentum(stage, coordinates, velocities), forces))
 
 
+    def over(self, times: Array) -> tuple[Array, Array]:
+        """Return coordinates and velocities at many times [s] (T, n)."""
+        frequencies, shapes, cosines, sines = self._modes
+        phases = np.outer(times - self.origin.stage.instant.time, frequencies)
+        cosine, sine = np.cos(phases), np.sin(phases)
+        coordinates = np.tile(self._rest, (len(times), 1))
+        velocities, clamped = np.zeros_like(coordinates), self.plant.prescribed
+        coordinates[:, clamped:] += (cosines * cosine + sines * sine) @ shapes.T
+        velocities[:, clamped:] = (frequencies * (sines * cosine - cosines * sine)) @ shapes.T
+        return coordinates, velocities
+
+
 def vibrating_tips(plant: Plant, times: Array) -> Array:
     """Return the tip deflections [m] at times [s] of a scene that `needs_no_steps`."""
     vibration = Vibration(plant, initial_state(plant, depth_law(plant.scene)))

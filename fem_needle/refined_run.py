@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import ceil, floor, sqrt
+from math import ceil, floor, inf, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,27 +28,27 @@ Array = NDArray[np.float64]
 FEWEST_STEPS = 25  # of the coarsest trial run
 FEWEST_SAMPLES = 50  # of a finer run: instants at which runs are compared
 STEPS_PER_LOAD_PERIOD = 4  # of the coarsest trial run
-STEPS_PER_NATURAL_PERIOD = 1.5  # likewise, where vibrations matter
+STEPS_PER_NATURAL_PERIOD = 1.5  # with which vibrations are resolved
+LEAST_TURN = 2.25  # that an unresolved vibration must appear to turn over the coarsest run, in rad: differences then show it
+APPARENT = 12.0  # an unresolved vibration appears to turn by 12 / (omega h) in a step
 MOST_RUNS = 14
 MOST_STEPS = 4_000_000
 MOST_MESHES = 6
 MOST_FAILURES = 5
-AIM = 0.8  # of the allowed error
+AIM = 0.9  # of the allowed error
 LEAST_TIME_SHARE = 0.5  # of the tolerance
 MESH_SHARE = 0.3  # of the tolerance: what the mesh may cost in motion
 VIBRATION_SHARE = 0.5  # of the tolerance: smaller vibrations need not be resolved
 TIME_ORDER = 4.0  # of the integrator with a spectral radius of 1, otherwise 3
 FIRST = 0.75  # of the method's order: what is hoped for before one is observed
 SMALLEST_ORDER = 0.5
-SAFETY = 1.5  # of an error that follows from an observed order
-MESH_SAFETY = 1.25  # of a difference from a finer mesh
-LEAST_FINER = 1.5  # times as many elements: a mesh to compare with
+SAFETY = 1.25  # of an error that follows from an observed order
+LEAST_FINER = 1.3  # times as many elements: a mesh to compare with
+SURE_ORDER = 3.0  # of the mesh's error in motion, at least
 MESH_ORDER = 5.0  # of the mesh's error in motion, to guess the elements that are needed
 PROVEN = 2.5  # ratio of steps over which an observed order is trusted
-FINAL_RATIO = 0.4  # of the last step: a shorter final step first gets a trial run of its own
-BEFORE_FINAL = 2.5  # times the final step: the step of that trial run
 LEAST_REFINEMENT = 0.7  # largest ratio of successive steps
-SHORTEST = 0.2  # smallest ratio of successive steps
+SHORTEST = 0.33  # smallest ratio of successive steps
 RATIOS = (1e-3, 2.0)  # of steps, between which the one that is needed is looked for
 
 
@@ -124,7 +124,7 @@ class Expectation:
         return float(brentq(lambda ratio: self.error(ratio) - allowed, *RATIOS))
 
 
-def expectation(steps: list[float], differences: list[float], order: float) -> Expectation:
+def expectation(steps: list[float], differences: list[float], order: float, *, resolved: bool = True) -> Expectation:
     """Return what is to be expected of the last of at least two runs, with a factor of `SAFETY`.
 
     The last two differences are those of C h^p + D h with non-negative C and D, p the order of the method; where they fall more
@@ -139,7 +139,12 @@ def expectation(steps: list[float], differences: list[float], order: float) -> E
         Of successive runs, one less, relative to the largest tip deflection.
     order
         Of the method.
+    resolved
+        Whether the steps of the last run but one resolve the slowest vibration that matters. Where not, the runs differ by what
+        the vibration does, whose phase is arbitrary in both: the difference counts in full, and no order.
     """
+    if not resolved:
+        return replace(expectation(steps, differences, order), bound=SAFETY * differences[-1])
     last, ratio = SAFETY * differences[-1], steps[-2] / steps[-1]
     if len(differences) < 2:
         hoped = FIRST * order
@@ -247,7 +252,7 @@ def _settle_mesh(search: _Search) -> _Trial:
         if ladder is None or finer is None:
             break
         other = search.run(replace(search.job, chosen=ladder.choice(finer, 0.0)), trial.step)
-        moved = MESH_SAFETY * difference(trial, other)
+        moved = difference(trial, other) / (1.0 - (plant.size / finer.size) ** SURE_ORDER)
         allowed = MESH_SHARE * search.tolerance
         search.job = replace(search.job, chosen=ladder.choice(plant, moved))
         if moved <= allowed:
@@ -274,10 +279,12 @@ def _first_trial(search: _Search) -> _Trial:
 def _find_step(search: _Search, first: _Trial) -> None:
     """Run with ever shorter steps until the estimated error of a run with all outputs is allowed."""
     order = TIME_ORDER if is_undamped(search.job) else TIME_ORDER - 1
+    slowest = resolving_step(search.job)
     runs, differences = [first, search.run(search.job, first.step / 2.0)], list[float]()
     while True:
         differences.append(difference(*runs[-2:]))
-        expected = expectation([run.step for run in runs], differences, order)
+        resolved = runs[-2].step <= slowest
+        expected = expectation([run.step for run in runs], differences, order, resolved=resolved)
         search.error = expected.bound
         if search.error <= search.allowed and runs[-1].is_whole:
             return
@@ -307,11 +314,8 @@ def _refuse_rounding(search: _Search, steps: float) -> None:
 
 
 def next_ratio(expected: Expectation, allowed: float) -> float:
-    """Return the ratio of the next step to the last one: the final step at once where it is near, a trial before it where not."""
-    ratio = expected.ratio(allowed)
-    if ratio < FINAL_RATIO:
-        ratio = max(BEFORE_FINAL * ratio, SHORTEST)
-    return min(ratio, LEAST_REFINEMENT)
+    """Return the ratio of the next step to the last one, which leads to the final step where that is near."""
+    return min(max(expected.ratio(allowed), SHORTEST), LEAST_REFINEMENT)
 
 
 def difference(coarser: _Trial, finer: _Trial) -> float:
@@ -333,13 +337,26 @@ def is_undamped(job: Job) -> bool:
     return isinstance(stepper, DynamicStepper) and abs(float(np.sum(stepper.method.nodes)) - 1.0) < 1e-12
 
 
+def resolving_step(job: Job) -> float:
+    """Return the longest step [s] that resolves the slowest vibration, infinite where none matters."""
+    if job.choice.analysis != "dynamic" or job.choice.vibration <= VIBRATION_SHARE * job.scene.numerics.tolerance:
+        return inf
+    return longest_period(job.plant) / STEPS_PER_NATURAL_PERIOD
+
+
 def coarsest_step(job: Job) -> float:
-    """Return the step [s] of the first trial run: loads are just resolved, and the slowest vibration where it may matter."""
-    step = likely_duration(job.scene) / FEWEST_STEPS
-    step = min(step, shortest_period(job.scene) / STEPS_PER_LOAD_PERIOD)
-    if job.choice.analysis == "dynamic" and job.choice.vibration > VIBRATION_SHARE * job.scene.numerics.tolerance:
-        step = min(step, longest_period(job.plant) / STEPS_PER_NATURAL_PERIOD)
-    return step
+    """Return the step [s] of the first trial run: loads are just resolved, and vibrations that matter show in its differences.
+
+    With a spectral radius of 1 a vibration of omega h >> 1 appears to turn by 12 / (omega h) in a step h, by 12 T / (omega h^2) in
+    the run: runs with different steps disagree about it long before they resolve it. Otherwise it is damped out, and nothing
+    would show it.
+    """
+    duration, resolving = likely_duration(job.scene), resolving_step(job)
+    step = min(duration / FEWEST_STEPS, shortest_period(job.scene) / STEPS_PER_LOAD_PERIOD)
+    if resolving == inf or not is_undamped(job):
+        return min(step, resolving)
+    frequency = 2 * pi / (STEPS_PER_NATURAL_PERIOD * resolving)
+    return min(step, max(resolving, sqrt(APPARENT * duration / (LEAST_TURN * frequency))))
 
 
 def sampled_grid(job: Job, step: float) -> TimeGrid:

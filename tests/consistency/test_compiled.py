@@ -7,10 +7,12 @@ import pytest
 
 from fem_needle import FiniteElementNeedle, SceneError, simulate
 from fem_needle.collocation import collocation
-from fem_needle.compiled_march import compiled_march
-from fem_needle.equilibrium_march import equilibrium_march
 from fem_needle.errors import ComputationError
+from fem_needle.legs.compiled import compiled_march
+from fem_needle.legs.equilibria import equilibrium_march
+from fem_needle.legs.vibrations import modal_march
 from fem_needle.march import march, time_grid
+from fem_needle.modal_stepper import ModalStepper
 from fem_needle.scene import Guide, LateralLoad, Sinusoid, Table, TipLoad
 from fem_needle.steppers import DynamicStepper, Inviscid, Massless, StaticStepper
 from reduced_model import AssumedModeNeedle
@@ -79,6 +81,14 @@ def test_equilibria(name):
     plant = FiniteElementNeedle(SCENES[name], elements=7)
     grid = time_grid(plant, SCENES[name].duration / 20, SCENES[name].duration / 9)
     assert_same(plant, StaticStepper(Inviscid(plant)), grid, equilibrium_march)
+
+
+@pytest.mark.parametrize("kind", ["entry", "hub"])
+def test_vibrations_of_a_held_needle(kind):
+    start = {"shape": "tip-displaced", "tip_deflection": 1e-3}
+    scene = scene_of(kind, held(0.1), LAYERS, initial=start, duration=0.02)
+    plant = FiniteElementNeedle(scene, elements=6)
+    assert_same(plant, ModalStepper(plant), time_grid(plant, 1e-3, 1e-3), modal_march)
 
 
 def test_equilibria_out_of_the_tissue_and_in_again():

@@ -6,10 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fem_needle import FiniteElementNeedle, ledger, leg_works, run_scene, simulate, solve_static
+from fem_needle import FiniteElementNeedle, ledger, run_scene, simulate, solve_static
 from fem_needle.exact import exact_static
 from fem_needle.ledger import configuration_force
-from fem_needle.leg import Leg
+from fem_needle.legs import works
+from fem_needle.legs.states import Leg
 from fem_needle.loads import load_case
 from fem_needle.motion import Instant
 from fem_needle.scene import Friction, Guide, Insertion, LateralLoad, Layer, Model, Numerics, Sinusoid, Table, TipLoad
@@ -163,7 +164,7 @@ BROKEN = {
     "numpy": [(ledger, name) for name in ("energy_force", "contact_force", "dissipation", "_hub_power", "axial_momentum")],
     "compiled": [
         *((Leg, name) for name in ("energy_forces", "contact_forces", "dissipation", "axial_momenta")),
-        (leg_works, "_hub_steps"),
+        (works, "_hub_steps"),
     ],
 }
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from fem_needle import ComputationError, FiniteElementNeedle, equilibrium_march, run_scene, simulate
+from fem_needle import ComputationError, FiniteElementNeedle, run_scene, simulate
+from fem_needle.legs import equilibria
 from fem_needle.march import TimeGrid, output_times, time_grid
 from fem_needle.scene import Sinusoid, TipLoad
 from fem_needle.steppers import StaticStepper
@@ -117,13 +118,13 @@ def test_a_failure_says_where_and_keeps_what_was_computed(monkeypatch):
 
 def test_a_failure_among_many_equilibria_does_so_too(monkeypatch):
     solved = []
-    factor = equilibrium_march.dpbtrf
+    factor = equilibria.dpbtrf
 
     def failing(band, lower):
         solved.append(1)
         return factor(band, lower=lower)[0], int(len(solved) > 22)  # the start, and four to a step
 
-    monkeypatch.setattr(equilibrium_march, "dpbtrf", failing)
+    monkeypatch.setattr(equilibria, "dpbtrf", failing)
     with pytest.raises(ComputationError, match=r"at time 0\.05 s, depth 0\.065 m failed") as caught:
         simulate(plant(), time_step=1e-2, analysis="static", output_step=0.01)
     assert caught.value.partial.time[-1] == pytest.approx(0.05)

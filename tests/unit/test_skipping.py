@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from fem_needle import FiniteElementNeedle, banded, leg_march, simulate
+from fem_needle import FiniteElementNeedle, banded, simulate
 from fem_needle.exact import natural_frequencies
 from fem_needle.free_response import natural_frequencies as computed_frequencies
 from fem_needle.free_response import ringing
 from fem_needle.inertia_effect import inertia_effect
+from fem_needle.legs import march as leg_loop
 from fem_needle.motion import shortest_period
 from fem_needle.scene import Guide, Initial, Insertion, Layer, Model, Sinusoid, TipLoad
 from fem_needle.skipping import RULES, inertia_free_stepper, unneeded_terms
@@ -168,8 +169,8 @@ def test_every_rule_has_its_test():
 def test_output_is_made_where_it_is_asked_for(monkeypatch):
     """Samples between the outputs are not computed: fewer outputs, fewer of them."""
     counted = []
-    original = leg_march._sample
-    monkeypatch.setattr(leg_march, "_sample", lambda *args: counted.append(1) or original(*args))
+    original = leg_loop._sample
+    monkeypatch.setattr(leg_loop, "_sample", lambda *args: counted.append(1) or original(*args))
     plant = FiniteElementNeedle(MOVING["entry"].with_value("numerics.loop", "compiled"), elements=4)
     for output_step, samples in ((1e-2, 4), (1e-3, 31)):
         counted.clear()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.leg import Leg
+from fem_needle.legs.states import Leg
 from fem_needle.tables import BENDING, CENTRIFUGAL, CONVECTION, DAMPING, MASS, TISSUE
 
 Array = NDArray[np.float64]

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 
-from fem_needle.course import Instants, instants_of
 from fem_needle.ledger import StepEnd
-from fem_needle.leg import Leg, gathered, scattered
-from fem_needle.leg_march import Piece, march_legs, pieces_of
-from fem_needle.leg_matrices import LegMatrices, without
+from fem_needle.legs.course import Instants, instants_of
+from fem_needle.legs.march import Piece, march_legs, pieces_of
+from fem_needle.legs.matrices import LegMatrices, without
+from fem_needle.legs.states import Leg, gathered, scattered
 from fem_needle.march import RunEnd, TimeGrid
 from fem_needle.motion import DepthLaw
 from fem_needle.plant import Plant

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.collocation import Collocation
-from fem_needle.course import Instants
-from fem_needle.leg_matrices import LegMatrices
+from fem_needle.legs.course import Instants
+from fem_needle.legs.matrices import LegMatrices
 from fem_needle.tables import (
     BENDING,
     CENTRIFUGAL,

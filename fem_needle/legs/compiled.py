@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from fem_needle.compiled.arguments import NodeCourse, arguments, at_nodes
 from fem_needle.compiled.loop import run_steps
 from fem_needle.compiled.notice import announced
-from fem_needle.course import Instants, instants_of
 from fem_needle.ledger import StepEnd
-from fem_needle.leg import Leg, momenta_of, point_forces_of, woven
-from fem_needle.leg_march import Piece, march_legs, pieces_of
-from fem_needle.leg_matrices import LegMatrices, without
+from fem_needle.legs.course import Instants, instants_of
+from fem_needle.legs.march import Piece, march_legs, pieces_of
+from fem_needle.legs.matrices import LegMatrices, without
+from fem_needle.legs.states import Leg, momenta_of, point_forces_of, woven
 from fem_needle.march import RunEnd, TimeGrid
 from fem_needle.motion import DepthLaw
 from fem_needle.plant import Plant

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from fem_needle import axial
 from fem_needle.initial import initial_state
 from fem_needle.ledger import StepEnd, Works
-from fem_needle.leg import Leg
-from fem_needle.leg_works import figures, leg_works, row_corrections
+from fem_needle.legs.states import Leg
+from fem_needle.legs.works import figures, leg_works, row_corrections
 from fem_needle.loads import LoadCase
 from fem_needle.march import RunEnd, TimeGrid, ends_by_itself, failed_step, pass_landing
 from fem_needle.motion import DepthLaw, Instant, depth_law
