@@ -14,7 +14,9 @@ THREADS = "OPENBLAS_NUM_THREADS"
 
 
 def machine(rivals: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return processor, cores, load (runnable processes, mean of a minute), threads of BLAS, versions of Python and packages; None where something is unknown.
+    """Return processor, cores, load, threads of BLAS, versions of Python and packages; None where something is unknown.
+
+    The load is the mean number of runnable processes in the last minute: above 1 others took part of the time.
 
     Parameters
     ----------
