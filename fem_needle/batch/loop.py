@@ -12,26 +12,23 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fem_needle.compiled.bands import ENTRANCE, INNER
-
-# Columns of a run's values.
-(
-    STIFFNESS,
+from fem_needle.batch.columns import (
+    AMPLITUDE,
+    ARRIVAL,
+    DEPTH,
+    DURATION,
+    FORCE,
+    FREQUENCY,
     MASS,
     MODULUS,
-    VISCOSITY,
-    DEPTH,
-    SPEED,
-    ARRIVAL,
-    FORCE,
-    AMPLITUDE,
-    FREQUENCY,
-    PHASE,
-    DURATION,
     OUTPUT_STEP,
+    PHASE,
+    SPEED,
+    STIFFNESS,
     TIME_STEP,
-) = range(14)
-VALUES = 14
+    VISCOSITY,
+)
+from fem_needle.compiled.bands import ENTRANCE, INNER
 
 
 @njit(**INNER)
@@ -155,7 +152,7 @@ def compute_runs(runs, roots, tips, convection, centrifugal, drag, method, outpu
     Parameters
     ----------
     runs
-        A row of values each (runs, VALUES).
+        A row each (`fem_needle.batch.columns`).
     roots, tips
         lambda_i and phi_i(tip) of all vibrations (all,).
     convection, centrifugal, drag

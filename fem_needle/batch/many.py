@@ -6,12 +6,13 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from importlib.util import find_spec
 from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fem_needle.batch import loop
+from fem_needle.batch import columns as at
 from fem_needle.batch.rows import can_vary, depths_of, row_of, rows_of, times_of
 from fem_needle.batch.spectrum import Spectrum, is_uniform, spectrum_of
 from fem_needle.collocation import collocation
@@ -99,14 +100,14 @@ def simulate_many(
     Notes
     -----
     Runs of the uniform kind (support ``entry``, one layer, constant speed, tip forces that are constant or a sinusoid, a start in
-    equilibrium) that share needle length and model go through one compiled loop, without any Python for a run. All others are
-    run one by one (`run_scene`), in as many processes as there are cores.
+    equilibrium) that share needle length and model go through one compiled loop, without any Python for a run. All others, and
+    all where numba is missing, are run one by one (`run_scene`), in as many processes as there are cores.
     """
     told = progress or _nobody
     workers = cores or os.cpu_count() or 1
     if isinstance(scenes, Scene):
         given = parameters or {}
-        if is_uniform(scenes) and can_vary(scenes, list(given)):
+        if has_loop() and is_uniform(scenes) and can_vary(scenes, list(given)):
             return _compiled(scenes, rows_of(scenes, given), time_step, vibrations, workers, told)
         return _one_by_one(_varied(scenes, given), workers, told)
     if parameters is not None:
@@ -114,9 +115,14 @@ def simulate_many(
     many = list(scenes)
     if not many:
         raise SceneError("scenes: nothing to compute (got 0; allowed 1 or more)")
-    if all(is_uniform(scene) and _shares(scene, many[0]) for scene in many):
+    if has_loop() and all(is_uniform(scene) and _shares(scene, many[0]) for scene in many):
         return _compiled(many[0], np.array([row_of(scene) for scene in many]), time_step, vibrations, workers, told)
     return _one_by_one(many, workers, told)
+
+
+def has_loop() -> bool:
+    """Return whether numba is there to compile the batch's loop."""
+    return find_spec("numba") is not None
 
 
 def _nobody(fraction: float) -> None:
@@ -141,7 +147,7 @@ def _compiled(
     """Compute uniform runs, with finer and finer settings where none are given."""
     times = times_of(rows)
     elements, moving = FIRST
-    step = min(float(np.min(rows[:, loop.OUTPUT_STEP])), _shortest_period(rows) / STEPS_PER_PERIOD)
+    step = min(float(np.min(rows[:, at.OUTPUT_STEP])), _shortest_period(rows) / STEPS_PER_PERIOD)
     is_given = time_step is not None and vibrations is not None
     coarser, estimate = None, np.nan
     for _ in range(MOST_LEVELS):
@@ -160,7 +166,7 @@ def _compiled(
 
 def _shortest_period(rows: Array) -> float:
     """Return the shortest period [s] of all runs' forces, infinity where none swings."""
-    fastest = float(np.max(np.abs(rows[:, loop.FREQUENCY]) * (rows[:, loop.AMPLITUDE] != 0.0)))
+    fastest = float(np.max(np.abs(rows[:, at.FREQUENCY]) * (rows[:, at.AMPLITUDE] != 0.0)))
     return 2 * np.pi / fastest if fastest else np.inf
 
 
@@ -181,8 +187,10 @@ def _tips(
     rows: Array, times: Array, spectrum: Spectrum, time_step: float, cores: int, progress: Progress
 ) -> tuple[Array, int]:
     """Return the tips (runs, outputs) and the number of steps: each core takes one piece of the runs after the other."""
+    from fem_needle.batch.loop import compute_runs
+
     rows = rows.copy()
-    rows[:, loop.TIME_STEP] = time_step
+    rows[:, at.TIME_STEP] = time_step
     tips = np.full(times.shape, np.nan)
     edges = np.unique(np.linspace(0, len(rows), min(len(rows), PIECES * cores) + 1).astype(int))
     method = collocation(1.0)
@@ -193,7 +201,7 @@ def _tips(
         matrices = (spectrum.convection, spectrum.centrifugal, spectrum.drag)
         work = (np.zeros((2, count)), np.zeros((2 * count, 2 * count)), np.zeros(2 * count))
         return int(
-            loop.compute_runs(rows[first:last], spectrum.roots, spectrum.tips, *matrices, constants, tips[first:last], *work)
+            compute_runs(rows[first:last], spectrum.roots, spectrum.tips, *matrices, constants, tips[first:last], *work)
         )
 
     steps, done = 0, 0

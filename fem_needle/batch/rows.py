@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fem_needle.batch import loop
+from fem_needle.batch import columns as at
 from fem_needle.errors import SceneError
 from fem_needle.motion import run_duration
 from fem_needle.scene import Scene, Sinusoid, Table, TipLoad, as_function
@@ -18,42 +18,42 @@ Array = NDArray[np.float64]
 OUTPUTS = 200
 # Values in proportion to which a number of a row changes.
 _PROPORTIONAL = {
-    "needle.youngs_modulus": loop.STIFFNESS,
-    "needle.second_moment_of_area": loop.STIFFNESS,
-    "needle.bending_stiffness": loop.STIFFNESS,
-    "needle.density": loop.MASS,
-    "needle.area": loop.MASS,
-    "needle.mass_per_length": loop.MASS,
-    "tissue.stiffness_factor": loop.MODULUS,
-    "tissue.layers.0.foundation_modulus": loop.MODULUS,
-    "tissue.layers.0.damping": loop.VISCOSITY,
-    "loads.0.force": loop.FORCE,
-    "loads.0.force.mean": loop.FORCE,
-    "loads.0.force.amplitude": loop.AMPLITUDE,
-    "loads.0.force.frequency": loop.FREQUENCY,
-    "loads.0.force.phase": loop.PHASE,
-    "insertion.initial_depth": loop.DEPTH,
-    "insertion.speed": loop.SPEED,
+    "needle.youngs_modulus": at.STIFFNESS,
+    "needle.second_moment_of_area": at.STIFFNESS,
+    "needle.bending_stiffness": at.STIFFNESS,
+    "needle.density": at.MASS,
+    "needle.area": at.MASS,
+    "needle.mass_per_length": at.MASS,
+    "tissue.stiffness_factor": at.MODULUS,
+    "tissue.layers.0.foundation_modulus": at.MODULUS,
+    "tissue.layers.0.damping": at.VISCOSITY,
+    "loads.0.force": at.FORCE,
+    "loads.0.force.mean": at.FORCE,
+    "loads.0.force.amplitude": at.AMPLITUDE,
+    "loads.0.force.frequency": at.FREQUENCY,
+    "loads.0.force.phase": at.PHASE,
+    "insertion.initial_depth": at.DEPTH,
+    "insertion.speed": at.SPEED,
 }
 
 
 def row_of(scene: Scene) -> Array:
     """Return the numbers of a scene that `is_uniform`, without a time step."""
     needle, insertion = scene.needle, scene.insertion
-    row = np.zeros(loop.VALUES)
+    row = np.zeros(at.VALUES)
     layer = scene.tissue.layers[0] if scene.tissue.layers else None
     factor = as_function(scene.tissue.stiffness_factor).value(0.0)
-    row[loop.STIFFNESS], row[loop.MASS] = needle.bending_stiffness, needle.mass_per_length
+    row[at.STIFFNESS], row[at.MASS] = needle.bending_stiffness, needle.mass_per_length
     if layer is not None:
-        row[loop.MODULUS], row[loop.VISCOSITY] = layer.foundation_modulus * factor, layer.damping
-    row[loop.DEPTH] = insertion.first_depth
+        row[at.MODULUS], row[at.VISCOSITY] = layer.foundation_modulus * factor, layer.damping
+    row[at.DEPTH] = insertion.first_depth
     if insertion.kind == "speed" and isinstance(insertion.speed, float):
-        row[loop.SPEED] = insertion.speed
-        row[loop.ARRIVAL] = np.inf if insertion.rest_time is None else insertion.rest_time
+        row[at.SPEED] = insertion.speed
+        row[at.ARRIVAL] = np.inf if insertion.rest_time is None else insertion.rest_time
     _set_force(row, scene)
-    row[loop.DURATION] = run_duration(scene)
+    row[at.DURATION] = run_duration(scene)
     step = scene.numerics.output_step
-    row[loop.OUTPUT_STEP] = row[loop.DURATION] / OUTPUTS if step == "auto" else step
+    row[at.OUTPUT_STEP] = row[at.DURATION] / OUTPUTS if step == "auto" else step
     return row
 
 
@@ -63,13 +63,13 @@ def _set_force(row: Array, scene: Scene) -> None:
         if not isinstance(load, TipLoad) or isinstance(force, Table):
             continue  # `is_uniform` has seen to it that there is none
         if isinstance(force, Sinusoid):
-            row[loop.FORCE] += force.mean
-            row[loop.AMPLITUDE], row[loop.PHASE] = force.amplitude, force.phase
-            row[loop.FREQUENCY] = 2 * np.pi * force.frequency
+            row[at.FORCE] += force.mean
+            row[at.AMPLITUDE], row[at.PHASE] = force.amplitude, force.phase
+            row[at.FREQUENCY] = 2 * np.pi * force.frequency
         elif load.bevel_coefficient is not None:
-            row[loop.FORCE] += load.bevel_coefficient * row[loop.MODULUS]
+            row[at.FORCE] += load.bevel_coefficient * row[at.MODULUS]
         else:
-            row[loop.FORCE] += float(force or 0.0)
+            row[at.FORCE] += float(force or 0.0)
 
 
 def rows_of(scene: Scene, parameters: Mapping[str, ArrayLike]) -> Array:
@@ -120,20 +120,20 @@ def _base_value(scene: Scene, path: str) -> float:
 
 def _set_arrival(rows: Array, scene: Scene) -> None:
     """Find when the needle comes to rest, and how long the run lasts, with other speeds or starts."""
-    final, was = scene.insertion.final_depth, rows[:, loop.DURATION].copy()
+    final, was = scene.insertion.final_depth, rows[:, at.DURATION].copy()
     if final is not None:
-        rows[:, loop.ARRIVAL] = (final - rows[:, loop.DEPTH]) / rows[:, loop.SPEED]
-        if np.any(rows[:, loop.ARRIVAL] < 0.0):
+        rows[:, at.ARRIVAL] = (final - rows[:, at.DEPTH]) / rows[:, at.SPEED]
+        if np.any(rows[:, at.ARRIVAL] < 0.0):
             raise SceneError("insertion.speed: leads away from insertion.final_depth in some runs")
         if scene.run.duration is None:
-            rows[:, loop.DURATION] = rows[:, loop.ARRIVAL]
+            rows[:, at.DURATION] = rows[:, at.ARRIVAL]
     if scene.numerics.output_step == "auto":
-        rows[:, loop.OUTPUT_STEP] *= rows[:, loop.DURATION] / was
+        rows[:, at.OUTPUT_STEP] *= rows[:, at.DURATION] / was
 
 
 def times_of(rows: Array) -> Array:
     """Return the output times [s] of every row (runs, outputs), 0, S, 2 S, ... and the end; NaN after it."""
-    duration, step = rows[:, loop.DURATION, None], rows[:, loop.OUTPUT_STEP, None]
+    duration, step = rows[:, at.DURATION, None], rows[:, at.OUTPUT_STEP, None]
     last = np.floor(duration / step * (1 + 1e-12))
     last += last * step <= duration * (1 - 1e-12)
     number = np.arange(int(np.max(last)) + 1)
@@ -142,5 +142,5 @@ def times_of(rows: Array) -> Array:
 
 def depths_of(rows: Array, times: Array) -> Array:
     """Return the depths [m] at times (runs, outputs)."""
-    arrival = rows[:, loop.ARRIVAL, None]
-    return rows[:, loop.DEPTH, None] + rows[:, loop.SPEED, None] * np.minimum(times, arrival)
+    arrival = rows[:, at.ARRIVAL, None]
+    return rows[:, at.DEPTH, None] + rows[:, at.SPEED, None] * np.minimum(times, arrival)

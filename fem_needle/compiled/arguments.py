@@ -19,6 +19,7 @@ from fem_needle.tables import (
     TISSUE,
     Matrices,
     OperatorTable,
+    PointTable,
 )
 
 Array = NDArray[np.float64]
@@ -69,22 +70,20 @@ def arguments(
 ) -> tuple:
     """Return the arguments; state: coordinates and momentum at the start (2, n), where the loop leaves those at the end.
 
-    The last but one are the record: coordinates at the stages (kept, 2, n), states at the ends (kept, 2, n), guides'
-    forces (kept, 2, guides).
+    The record is in them: coordinates at the stages and states at the ends, and, where there are guides, their forces
+    (`fem_needle.compiled.loop.run_steps`, ``kept`` and ``guides``).
     """
     matrices, points = table.matrices, table.points
-    guides, size, rows = points.guides, state.shape[1], matrices.bases.shape[1]
+    size, rows = state.shape[1], matrices.bases.shape[1]
     clamp = np.ascontiguousarray(np.stack([course.clamp, course.clamp_rates], axis=1)[:, :, :clamped])
-    opened = np.einsum("tgl,tl->tg", points.flexibility[:, :guides, guides:], course.forces)
-    compliance = points.flexibility[:, :guides, :guides] + np.diag(points.guide_compliance)
     kept, free = 1 + int(np.max(course.kept, initial=-1)), 2 * (size - clamped)
     return (
         _terms(matrices, _uses(matrices, course, inertia=inertia)),
-        (points.rows, points.first, np.ascontiguousarray(compliance), np.ascontiguousarray(opened)),
+        (points.rows, points.first),
         (course.lengths, course.forces, clamp, np.ascontiguousarray(course.end_clamp[:, :clamped]), course.kept),
         (method.inverse, method.end),
         state,
-        (np.zeros((kept, 2, size)), np.zeros((kept, 2, size)), np.zeros((kept, 2, guides))),
+        (np.zeros((kept, 2, size)), np.zeros((kept, 2, size))),
         (
             np.zeros((2, 4, rows, size)),
             np.zeros((free, 2 * rows + 1)),
@@ -93,11 +92,24 @@ def arguments(
             np.zeros(free),
             np.zeros((2, size)),
             np.zeros((2, size)),
-            np.zeros((2 * guides, free)),
-            np.zeros((2 * guides, free)),
-            np.zeros((2 * guides, 2 * guides)),
-            np.zeros(2 * guides),
         ),
+        _guides(points, course, kept, free) if points.guides else None,
+    )
+
+
+def _guides(points: PointTable, course: NodeCourse, kept: int, free: int) -> tuple:
+    """Return what the guides need."""
+    guides = points.guides
+    compliance = points.flexibility[:, :guides, :guides] + np.diag(points.guide_compliance)
+    opened = np.einsum("tgl,tl->tg", points.flexibility[:, :guides, guides:], course.forces)
+    return (
+        np.ascontiguousarray(compliance),
+        np.ascontiguousarray(opened),
+        np.zeros((kept, 2, guides)),
+        np.zeros((2 * guides, free)),
+        np.zeros((2 * guides, free)),
+        np.zeros((2 * guides, 2 * guides)),
+        np.zeros(2 * guides),
     )
 
 

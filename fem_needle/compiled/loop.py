@@ -120,13 +120,15 @@ def _add_forces(rows, firsts, forces, clamped, stage, answer):
 
 
 @njit(**INNER)
-def _hold_guides(first, matrix, rows, firsts, compliance, gaps, known, clamped, columns, answers, dense, answer):
-    """Add the guides' forces, which come out in ``gaps`` (2 guides,): N q + B P + compliance R = 0 at both stages."""
-    guides, width = compliance.shape[1], rows.shape[2]
+def _hold_guides(first, matrix, rows, firsts, known, clamped, answer, target, guides):
+    """Add the guides' forces: N q + B P + compliance R = 0 at both stages; arrays as `run_steps` takes them."""
+    compliance, opened, kept, columns, answers, dense, gaps = guides
+    count = compliance.shape[1]
     columns[:, :] = 0.0
-    for number in range(2 * guides):
-        stage, guide = number // guides, number % guides
-        for column in range(width):
+    for number in range(2 * count):
+        stage, guide = number // count, number % count
+        gaps[number] = -opened[first + stage, guide]
+        for column in range(rows.shape[2]):
             index, entry = firsts[first + stage, guide] + column, rows[first + stage, guide, column]
             gaps[number] -= entry * known[stage, index]
             if index >= clamped:
@@ -136,18 +138,20 @@ def _hold_guides(first, matrix, rows, firsts, compliance, gaps, known, clamped, 
         solve(matrix, matrix.shape[1] // 2, answers[number])
         for index in range(len(answer)):
             gaps[number] -= columns[number, index] * answer[index]
-    for number in range(2 * guides):
-        for other in range(2 * guides):
-            entry, stage = 0.0, number // guides
-            if stage == other // guides:
-                entry = compliance[first + stage, number % guides, other % guides]
+    for number in range(2 * count):
+        for other in range(2 * count):
+            entry, stage = 0.0, number // count
+            if stage == other // count:
+                entry = compliance[first + stage, number % count, other % count]
             for index in range(len(answer)):
                 entry += columns[number, index] * answers[other, index]
             dense[number, other] = entry
     solve_dense(dense, gaps)
-    for number in range(2 * guides):
+    for number in range(2 * count):
         for index in range(len(answer)):
             answer[index] += gaps[number] * answers[number, index]
+        if target >= 0:
+            kept[target, number // count, number % count] = gaps[number]
 
 
 @njit(**INNER)
@@ -185,7 +189,7 @@ def _copy(source, target):
 
 
 @njit(**ENTRANCE)
-def run_steps(terms, points, course, scheme, state, kept, work):
+def run_steps(terms, points, course, scheme, state, kept, work, guides):
     """Go through all steps; returns how many were done, fewer where the next one's equations have no finite answer.
 
     Parameters
@@ -194,8 +198,7 @@ def run_steps(terms, points, course, scheme, state, kept, work):
         Bases (bases, 2 b + 1, n), their element matrices (bases, elements, m, m), stride; at the nodes (2 steps,): sums, ranges
         (operator and base), range_scale, range_ends, blocks (operator and first coordinate), block; see `_assemble`.
     points
-        Rows (2 steps, points, m), first coordinates, and for the guides: compliance (2 steps, guides, guides) and gaps that known
-        forces open (2 steps, guides).
+        Rows (2 steps, points, m) and first coordinates, the guides first.
     course
         Lengths of the steps, loads (2 steps, loads), clamp (2 steps, 2, clamped), clamp at the ends (steps, clamped), and the row
         of ``kept`` that receives each step, -1: none.
@@ -204,42 +207,42 @@ def run_steps(terms, points, course, scheme, state, kept, work):
     state
         Coordinates and momentum (2, n), at the start and, afterwards, at the end of the last step done.
     kept
-        Coordinates at the stages (kept, 2, n), end state (kept, 2, n), guides' forces (kept, 2, guides).
+        Coordinates at the stages (kept, 2, n) and end state (kept, 2, n).
     work
         Operators (2, 4, 2 b + 1, n), matrix (2 free, 4 b + 3), known (4, n), side (2, n), answer (2 free,), end (2, n), stages
-        (2, n), columns and answers (2 guides, 2 free), dense (2 guides, 2 guides), gaps (2 guides,).
+        (2, n).
+    guides
+        None, or compliance (2 steps, guides, guides), gaps that known forces open (2 steps, guides), the record of the forces
+        (kept, 2, guides), and to work on: columns and answers (2 guides, 2 free), dense (2 guides, 2 guides), gaps (2 guides,).
+        With None all that concerns guides is not even compiled.
     """
     bases, local, stride, sums, ranges, range_scale, range_ends, blocks, block = terms
-    rows, firsts, compliance, opened = points
+    rows, firsts = points
     lengths, loads, clamp, end_clamp, target = course
     inverse, end_shares = scheme
-    kept_stages, kept_ends, kept_forces = kept
-    operators, matrix, known, side, answer, end, stages, columns, answers, dense, gaps = work
-    guides, clamped = compliance.shape[1], end_clamp.shape[1]
+    kept_stages, kept_ends = kept
+    operators, matrix, known, side, answer, end, stages = work
+    clamped, width, skipped = end_clamp.shape[1], matrix.shape[1] // 2, rows.shape[1] - loads.shape[1]
     for step in range(len(lengths)):
         length, first = lengths[step], 2 * step
         answer[:] = 0.0
         for stage in range(2):
             at, part = first + stage, operators[stage]
             _assemble(bases, local, stride, sums[at], ranges, range_scale[at], range_ends[at], blocks[at], block[at], part)
-            _add_forces(rows[at, guides:], firsts[at, guides:], loads[at], clamped, stage, answer)
+            _add_forces(rows[at, skipped:], firsts[at, skipped:], loads[at], clamped, stage, answer)
         _fill_matrix(operators, inverse, length, clamped, matrix)
         _fill_right_side(operators, inverse, length, clamp[first : first + 2], state, known, side, answer)
-        if not factor(matrix, matrix.shape[1] // 2):
+        if not factor(matrix, width):
             return step
-        solve(matrix, matrix.shape[1] // 2, answer)
-        for number in range(2 * guides):
-            gaps[number] = -opened[first + number // guides, number % guides]
-        if guides:
-            _hold_guides(first, matrix, rows, firsts, compliance, gaps, known, clamped, columns, answers, dense, answer)
-        rates = clamp[first : first + 2, 1]
-        if not _finish(operators, inverse, length, end_shares, rates, known, answer, stages, end, state):
+        solve(matrix, width, answer)
+        if guides is not None:
+            _hold_guides(first, matrix, rows, firsts, known, clamped, answer, target[step], guides)
+        if not _finish(operators, inverse, length, end_shares, clamp[first : first + 2, 1], known, answer, stages, end, state):
             return step
         for index in range(clamped):
             end[0, index] = end_clamp[step, index]
         if target[step] >= 0:
             _copy(stages, kept_stages[target[step]])
             _copy(end, kept_ends[target[step]])
-            _copy(gaps.reshape((2, guides)), kept_forces[target[step]])
         _copy(end, state)
     return len(lengths)

@@ -51,7 +51,8 @@ def _computed(plant: Plant, stepper: DynamicStepper, law: DepthLaw, piece: Piece
     given = arguments(at_nodes(table), course, stepper.method, plant.prescribed, state, inertia=stepper.inertia)
     with announced():
         done = int(run_steps(*given))
-    kept = tuple(part[:done] for part in given[5])
+    guide_forces = np.zeros((len(lengths), 2, 0)) if given[-1] is None else given[-1][2]
+    kept = tuple(part[:done] for part in (*given[5], guide_forces))
     return _leg(plant, stepper, instants.first(3 * done + 1), table, lengths[:done], start, kept), done
 
 

@@ -5,12 +5,13 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from fem_needle import FiniteElementNeedle, SceneError, simulate
+from fem_needle import FiniteElementNeedle, SceneError, loops, simulate
 from fem_needle.collocation import collocation
 from fem_needle.errors import ComputationError
 from fem_needle.legs.compiled import compiled_march
 from fem_needle.legs.equilibria import equilibrium_march
 from fem_needle.legs.vibrations import modal_march
+from fem_needle.loops import is_compiled, run_loop
 from fem_needle.march import march, time_grid
 from fem_needle.modal_stepper import ModalStepper
 from fem_needle.scene import Guide, LateralLoad, Sinusoid, Table, TipLoad
@@ -153,3 +154,13 @@ def test_a_step_without_an_answer_says_where(monkeypatch):
         for sample in compiled_march(plant, DynamicStepper(plant, collocation(1.0)), time_grid(plant, 1e-3, 2e-3)):
             seen.append(sample)
     assert len(seen) > 3
+
+
+def test_without_numba_the_steps_are_taken_in_numpy(monkeypatch):
+    scene = scene_of("entry", moving(0.5, 0.02, 0.06), duration=0.02)
+    plant = FiniteElementNeedle(scene, elements=4)
+    stepper, grid = DynamicStepper(plant, collocation(1.0)), time_grid(plant, 2e-5, 1e-2)
+    assert is_compiled(plant, stepper, grid)
+    monkeypatch.setattr(loops, "find_spec", lambda name: None)
+    assert not is_compiled(plant, stepper, grid)
+    assert len(samples(run_loop(plant, stepper, time_grid(plant, 1e-3, 1e-2)))[0]) == 3

@@ -12,7 +12,12 @@ LONGEST_FILE = 400
 SOURCE = python_files(*PACKAGES)
 # Where an import inside a function is right: commands load what they use, a result reaches its folder late, a run that steps
 # little does not wait for numba.
-LATE_IMPORTS = {("fem_needle.trajectory", "save"), ("fem_needle.trajectory", "load"), ("fem_needle.loops", "run_loop")}
+LATE_IMPORTS = {
+    ("fem_needle.trajectory", "save"),
+    ("fem_needle.trajectory", "load"),
+    ("fem_needle.loops", "run_loop"),
+    ("fem_needle.batch.many", "_tips"),
+}
 LATE_PACKAGES = ("fem_needle.cli", "reduced_model.commands")
 
 
