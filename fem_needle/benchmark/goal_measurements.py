@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fem_needle.batch.many import simulate_many
 from fem_needle.benchmark.cases import Case, cases_of
 from fem_needle.benchmark.loop import whole_loop, whole_run
+from fem_needle.benchmark.machine import load
 from fem_needle.benchmark.methods import Setting
 from fem_needle.benchmark.own_methods import AssumedModes, FixedElements, ToleranceElements
 from fem_needle.benchmark.random_scenes import random_scene
@@ -33,6 +34,7 @@ ELEMENTS, STEP = 40, 5e-4  # s
 ROUNDS = 3
 HIT_RATE = 99.0  # %
 BATCH, FEW = 10_000, 8
+BUSY = 1.5  # processes: what a benchmark alone stays below
 MODULUS = "tissue.layers.0.foundation_modulus"
 PROCESS_ROUNDS = 5
 MICROSECONDS = 1e6
@@ -192,5 +194,6 @@ def batch_efficiency() -> Measured:
 
     for cores in (1, 2):
         run(FEW, cores)  # compiles
+    others = f"; others kept the cores busy, load {load():.1f}" if load() > BUSY else ""
     one, two = run(BATCH, 1), run(BATCH, 2)
-    return Measured(100.0 * one / (2 * two), f"{BATCH} runs: {one:.3g} s on one core, {two:.3g} s on two")
+    return Measured(100.0 * one / (2 * two), f"{BATCH} runs: {one:.3g} s on one core, {two:.3g} s on two{others}")

@@ -26,12 +26,17 @@ def machine(rivals: tuple[str, ...] = ()) -> dict[str, Any]:
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
-        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        "load": load(),
         "system": f"{platform.system()} {platform.machine()}",
         "blas_threads": os.environ.get(THREADS),
         "python": platform.python_version(),
         **{name: _version(name) for name in (*PACKAGES, *rivals)},
     }
+
+
+def load() -> float:
+    """Return the mean number of runnable processes in the last minute; 0 where nobody counts them."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
 
 
 def commit() -> str | None:

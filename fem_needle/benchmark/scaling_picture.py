@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 from fem_needle.benchmark.result import ScalingRow
 from fem_needle.pictures import COLORS, MARKERS, new_figure, png_bytes, shared_style
@@ -38,3 +39,7 @@ def _draw(axes: Axes, rows: tuple[ScalingRow, ...], over: str, name: str) -> Non
         style: dict[str, Any] = {"color": COLORS[index], "marker": MARKERS[index], "label": method}
         axes.plot([row.size for row in chosen], [UNITS[name] * getattr(row, name) for row in chosen], **style)
     axes.set(xlabel="elements" if over == "elements" else "duration [s]", ylabel=LABELS[name])
+    if over == "duration":
+        axes.set_xticks(sorted({row.size for row in rows if row.over == over}))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda size, _: f"{size:g}"))
+        axes.xaxis.set_minor_locator(NullLocator())
