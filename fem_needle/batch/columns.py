@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-# Columns of a run's values.
+# START: the tip deflection [m] of the static shape under a tip force that is let go at t = 0 (0: straight), or NaN: equilibrium.
 (
     STIFFNESS,
     MASS,
@@ -18,5 +18,6 @@ from __future__ import annotations
     DURATION,
     OUTPUT_STEP,
     TIME_STEP,
-) = range(14)
-VALUES = 14
+    START,
+) = range(15)
+VALUES = 15

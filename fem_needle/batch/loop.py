@@ -24,6 +24,7 @@ from fem_needle.batch.columns import (
     OUTPUT_STEP,
     PHASE,
     SPEED,
+    START,
     STIFFNESS,
     TIME_STEP,
     VISCOSITY,
@@ -46,8 +47,39 @@ def _depth(run, time):
 
 
 @njit(**INNER)
+def _release_force(run, roots, tips):
+    """Return the tip force [N] that holds the shape which is let go."""
+    bending, tissue, compliance = run[STIFFNESS] / run[DEPTH] ** 3, run[MODULUS] * run[DEPTH], 0.0
+    for i in range(len(roots)):
+        compliance += tips[i] * tips[i] / (bending * roots[i] + tissue)
+    return run[START] / compliance
+
+
+@njit(**INNER)
+def _set_vibration(run, roots, tips, outputs):
+    """Set the tips of a held needle without damping under a constant force: all its vibrations, turned from output to output."""
+    bending, tissue, force = run[STIFFNESS] / run[DEPTH] ** 3, run[MODULUS] * run[DEPTH], run[FORCE]
+    away, last = _release_force(run, roots, tips) - force, len(outputs) - 1
+    outputs[:] = 0.0
+    for i in range(len(roots)):
+        stiffness = bending * roots[i] + tissue
+        frequency, amplitude = np.sqrt(stiffness / (run[MASS] * run[DEPTH])), tips[i] * tips[i] / stiffness
+        cosine, sine = np.cos(frequency * run[OUTPUT_STEP]), np.sin(frequency * run[OUTPUT_STEP])
+        real, imaginary = amplitude * away, 0.0
+        for output in range(last):
+            outputs[output] += amplitude * force + real
+            real, imaginary = real * cosine - imaginary * sine, real * sine + imaginary * cosine
+        outputs[last] += amplitude * force + amplitude * away * np.cos(frequency * run[DURATION])
+
+
+@njit(**INNER)
 def _start(run, roots, tips, convection, state):
-    """Set amplitudes and momenta of the equilibrium at t = 0, at the rate of the equilibria over the depth."""
+    """Set amplitudes and momenta at t = 0: of a shape that is let go, or of the equilibrium, moving as equilibria do."""
+    if not np.isnan(run[START]):
+        bending, tissue, force = run[STIFFNESS] / run[DEPTH] ** 3, run[MODULUS] * run[DEPTH], _release_force(run, roots, tips)
+        for i in range(convection.shape[0]):
+            state[0, i], state[1, i] = force * tips[i] / (bending * roots[i] + tissue), 0.0
+        return
     z, force, speed = run[DEPTH], _force(run, 0.0), run[SPEED] if run[ARRIVAL] > 0.0 else 0.0
     count = convection.shape[0]
     for i in range(count):
@@ -170,6 +202,9 @@ def compute_runs(runs, roots, tips, convection, centrifugal, drag, method, outpu
         last = int(np.floor(run[DURATION] / run[OUTPUT_STEP] * (1.0 + 1e-12)))
         if last * run[OUTPUT_STEP] <= run[DURATION] * (1.0 - 1e-12):
             last += 1
+        if run[SPEED] == 0.0 and run[VISCOSITY] == 0.0 and run[AMPLITUDE] == 0.0 and not np.isnan(run[START]):
+            _set_vibration(run, roots, tips, outputs[number, : last + 1])
+            continue
         _start(run, roots, tips, convection, state)
         outputs[number, 0] = _tip(run, 0.0, roots, tips, count, state[0])
         for output in range(1, last + 1):

@@ -99,9 +99,9 @@ def simulate_many(
 
     Notes
     -----
-    Runs of the uniform kind (support ``entry``, one layer, constant speed, tip forces that are constant or a sinusoid, a start in
-    equilibrium) that share needle length and model go through one compiled loop, without any Python for a run. All others, and
-    all where numba is missing, are run one by one (`run_scene`), in as many processes as there are cores.
+    Runs of the uniform kind (support ``entry``, one layer, constant speed, tip forces that are constant or a sinusoid) that share
+    needle length and model go through one compiled loop, without any Python for a run. All others, and all where numba is
+    missing, are run one by one (`run_scene`), in as many processes as there are cores.
     """
     told = progress or _nobody
     workers = cores or os.cpu_count() or 1
@@ -183,30 +183,33 @@ def _spectrum(scene: Scene, elements: int, moving: int) -> Spectrum:
     return spectrum_of(build_plant(scene), moving if scene.numerics.analysis in {"auto", "dynamic"} else 0)
 
 
+def prepared(rows: Array, spectrum: Spectrum, time_step: float) -> Callable[[Array, int, int], int]:
+    """Return what computes some rows (from, to) into an array of tips (runs, outputs) and returns the number of steps."""
+    from fem_needle.batch.loop import compute_runs
+
+    rows, method, count = rows.copy(), collocation(1.0), len(spectrum.convection)
+    rows[:, at.TIME_STEP] = time_step
+    constants = np.stack([method.nodes, *method.inverse, method.end])
+    matrices = (spectrum.convection, spectrum.centrifugal, spectrum.drag)
+
+    def compute(tips: Array, first: int, last: int) -> int:
+        work = (np.zeros((2, count)), np.zeros((2 * count, 2 * count)), np.zeros(2 * count))
+        chosen = rows[first:last]
+        return int(compute_runs(chosen, spectrum.roots, spectrum.tips, *matrices, constants, tips[first:last], *work))
+
+    return compute
+
+
 def _tips(
     rows: Array, times: Array, spectrum: Spectrum, time_step: float, cores: int, progress: Progress
 ) -> tuple[Array, int]:
     """Return the tips (runs, outputs) and the number of steps: each core takes one piece of the runs after the other."""
-    from fem_needle.batch.loop import compute_runs
-
-    rows = rows.copy()
-    rows[:, at.TIME_STEP] = time_step
+    compute = prepared(rows, spectrum, time_step)
     tips = np.full(times.shape, np.nan)
     edges = np.unique(np.linspace(0, len(rows), min(len(rows), PIECES * cores) + 1).astype(int))
-    method = collocation(1.0)
-    constants = np.stack([method.nodes, *method.inverse, method.end])
-
-    def compute(first: int, last: int) -> int:
-        count = len(spectrum.convection)
-        matrices = (spectrum.convection, spectrum.centrifugal, spectrum.drag)
-        work = (np.zeros((2, count)), np.zeros((2 * count, 2 * count)), np.zeros(2 * count))
-        return int(
-            compute_runs(rows[first:last], spectrum.roots, spectrum.tips, *matrices, constants, tips[first:last], *work)
-        )
-
     steps, done = 0, 0
     with ThreadPoolExecutor(cores) as pool:
-        waiting = {pool.submit(compute, int(a), int(b)): int(b - a) for a, b in pairwise(edges)}
+        waiting = {pool.submit(compute, tips, int(a), int(b)): int(b - a) for a, b in pairwise(edges)}
         for finished in as_completed(waiting):
             steps, done = steps + finished.result(), done + waiting[finished]
             progress(done / len(rows))

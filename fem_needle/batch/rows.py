@@ -32,6 +32,7 @@ _PROPORTIONAL = {
     "loads.0.force.amplitude": at.AMPLITUDE,
     "loads.0.force.frequency": at.FREQUENCY,
     "loads.0.force.phase": at.PHASE,
+    "initial.tip_deflection": at.START,
     "insertion.initial_depth": at.DEPTH,
     "insertion.speed": at.SPEED,
 }
@@ -52,6 +53,8 @@ def row_of(scene: Scene) -> Array:
         row[at.ARRIVAL] = np.inf if insertion.rest_time is None else insertion.rest_time
     _set_force(row, scene)
     row[at.DURATION] = run_duration(scene)
+    released = {"equilibrium": np.nan, "straight": 0.0, "tip-displaced": scene.initial.tip_deflection or 0.0}
+    row[at.START] = released[scene.initial.shape]
     step = scene.numerics.output_step
     row[at.OUTPUT_STEP] = row[at.DURATION] / OUTPUTS if step == "auto" else step
     return row

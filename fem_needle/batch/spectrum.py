@@ -70,10 +70,10 @@ def is_uniform(scene: Scene) -> bool:
     """Return whether a run is one of the kind that the batch's own loop knows.
 
     Support ``entry``, one layer that holds the whole inserted part (or none), a constant speed or none, tip forces that are
-    constant or one sinusoid, a start in equilibrium, a straight rest line, no swelling, no numerical damping.
+    constant or one sinusoid, a straight rest line, no swelling, no numerical damping.
     """
     tissue, insertion = scene.tissue, scene.insertion
-    if scene.support.kind != "entry" or scene.initial.shape != "equilibrium" or scene.numerics.mesh is not None:
+    if scene.support.kind != "entry" or scene.numerics.mesh is not None:
         return False
     if tissue.rest_line != "straight" or tissue.tip_stiffness or not isinstance(tissue.stiffness_factor, float):
         return False

@@ -5,6 +5,7 @@ import pytest
 
 from fem_needle import SceneError, load_scene, run_scene, simulate_many
 from fem_needle.batch import many
+from fem_needle.exact import ReleaseFromTipForce
 from fem_needle.scene import Sinusoid, TipLoad
 from tests.consistency.scenes import BUZZ, LAYERS, held, moving, scene_of
 
@@ -124,3 +125,20 @@ def test_without_numba_every_run_is_one_of_its_own(monkeypatch):
     assert found.tip_deflection.shape == expected.tip_deflection.shape
     scale = np.max(np.abs(expected.tip_deflection))
     assert np.max(np.abs(found.tip_deflection - expected.tip_deflection)) < 2e-3 * scale
+
+
+def test_a_release_is_turned_from_output_to_output():
+    scene = load_scene("bench-d").with_values({"run.duration": 0.0305, "numerics.tolerance": 1e-3})
+    found = simulate_many(scene, {"initial.tip_deflection": [1e-3, 2e-3]})
+    exact = np.asarray(ReleaseFromTipForce(scene).tip_deflection(found.time[0]))
+    for scale, tips in zip((1e-3, 2e-3), found.tip_deflection, strict=True):
+        assert np.max(np.abs(tips / scale - exact / exact[0])) < 1e-3
+    assert found.error_estimate < 0.5e-3
+
+
+@pytest.mark.parametrize("start", [{"shape": "straight"}, {"shape": "tip-displaced", "tip_deflection": 1e-3}])
+def test_a_damped_start_away_from_equilibrium(start):
+    held_there = {"kind": "hold", "initial_depth": 0.1}
+    scene = SWINGING.with_values({"initial": start, "tissue.layers.0.damping": 20.0, "insertion": held_there})
+    found, exact = simulate_many(scene), one_by_one(scene, elements=24, time_step=5e-5)
+    assert np.max(np.abs(found.tip_deflection[0] - exact)) < 1e-3 * np.max(np.abs(exact))
