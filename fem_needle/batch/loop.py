@@ -109,34 +109,48 @@ def _tip(run, time, roots, tips, count, amplitudes):
 
 @njit(**INNER)
 def _step(run, time, length, speed, roots, tips, convection, centrifugal, drag, method, state, matrix, right):
-    """Take one step of a collocation method with two stages; ``method``: its nodes, A^-1 and b A^-1 (4, 2)."""
-    count, mass = convection.shape[0], run[MASS]
-    matrix[:, :] = 0.0
+    """Fill matrix and right-hand side of a step of a collocation method with two stages.
+
+    ``method``: its nodes, A^-1 and b A^-1 (4, 2).
+    """
+    count, mass, rate = convection.shape[0], run[MASS], 1.0 / length
+    early, late = _depth(run, time + method[0, 0] * length), _depth(run, time + method[0, 1] * length)
+    first, second = mass * early * rate * rate, mass * late * rate * rate
     for stage in range(2):
-        now = time + method[0, stage] * length
-        z, force = _depth(run, now), _force(run, now)
-        bending, tissue = run[STIFFNESS] / z**3, run[MODULUS] * z
+        z = late if stage else early
+        force = _force(run, time + method[0, stage] * length)
+        bending, tissue = run[STIFFNESS] / (z * z * z), run[MODULUS] * z
+        known = (method[1 + stage, 0] + method[1 + stage, 1]) * rate
+        for other in range(2):  # A^-1 M A^-1 and C A^-1, of every vibration alike
+            inertia = method[1 + stage, 0] * method[1, other] * first + method[1 + stage, 1] * method[2, other] * second
+            inertia += method[1 + stage, other] * rate * run[VISCOSITY] * z
+            for i in range(count):
+                matrix[2 * i + stage, 2 * i + other] = inertia
         for i in range(count):
-            stiffness, row = bending * roots[i] + tissue, 2 * i + stage
-            total = force * tips[i] - stiffness * state[0, i]
-            matrix[row, row] += stiffness
-            for other in range(2):
-                slope = method[1 + stage, other] / length
-                total += slope * state[1, i]
-                matrix[row, 2 * i + other] += slope * run[VISCOSITY] * z
-                for third in range(2):  # A^-1 M A^-1 with the mass of the stage in the middle
-                    inner = method[1 + third, stage] / length * method[1 + stage, other] / length
-                    matrix[2 * i + third, 2 * i + other] += inner * mass * z
-            right[row] += total
-            if speed != 0.0:
-                for j in range(count):
-                    here = run[VISCOSITY] * speed * drag[i, j] - mass * speed * speed / z * centrifugal[i, j]
-                    right[row] -= here * state[0, j]
-                    matrix[row, 2 * j + stage] += here
-                    for other in range(2):
-                        slope = method[1 + stage, other] / length * mass * speed
-                        matrix[row, 2 * j + other] += slope * (convection[i, j] - convection[j, i])
-                        right[row] -= slope * convection[i, j] * state[0, j]
+            stiffness = bending * roots[i] + tissue
+            matrix[2 * i + stage, 2 * i + stage] += stiffness
+            right[2 * i + stage] = force * tips[i] - stiffness * state[0, i] + known * state[1, i]
+        if speed != 0.0:
+            _add_convection(run, z, speed, rate, stage, convection, centrifugal, drag, method, state, matrix, right)
+
+
+@njit(**INNER)
+def _add_convection(run, z, speed, rate, stage, convection, centrifugal, drag, method, state, matrix, right):
+    """Add what moving along the tissue does at a stage: v S - v S^T, - v^2 R and v D."""
+    count, mass = convection.shape[0], run[MASS]
+    momentum, known = mass * speed, (method[1 + stage, 0] + method[1 + stage, 1]) * rate
+    viscous, falling = run[VISCOSITY] * speed, mass * speed * speed / z
+    own, other = method[1 + stage, stage] * rate * momentum, method[1 + stage, 1 - stage] * rate * momentum
+    for i in range(count):
+        row = 2 * i + stage
+        for j in range(count):
+            here, skew = viscous * drag[i, j] - falling * centrifugal[i, j], convection[i, j] - convection[j, i]
+            right[row] -= (here + known * momentum * convection[i, j]) * state[0, j]
+            if i == j:
+                matrix[row, 2 * j + stage] += here
+            else:
+                matrix[row, 2 * j + stage] = here + own * skew
+                matrix[row, 2 * j + 1 - stage] = other * skew
 
 
 @njit(**INNER)
@@ -145,17 +159,17 @@ def _solve(matrix, right):
     size = len(right)
     for i in range(size):
         inverse = 1.0 / matrix[i, i]
+        matrix[i, i] = inverse
         for k in range(i + 1, size):
             share = matrix[k, i] * inverse
-            if share != 0.0:
-                right[k] -= share * right[i]
-                for j in range(i + 1, size):
-                    matrix[k, j] -= share * matrix[i, j]
+            right[k] -= share * right[i]
+            for j in range(i + 1, size):
+                matrix[k, j] -= share * matrix[i, j]
     for i in range(size - 1, -1, -1):
         total = right[i]
         for j in range(i + 1, size):
             total -= matrix[i, j] * right[j]
-        right[i] = total / matrix[i, i]
+        right[i] = total * matrix[i, i]
 
 
 @njit(**INNER)
@@ -214,9 +228,9 @@ def compute_runs(runs, roots, tips, convection, centrifugal, drag, method, outpu
                 parts = max(1, int(np.ceil((end - time) / run[TIME_STEP] - 1e-9)))
                 speed = run[SPEED] if 0.5 * (time + end) < run[ARRIVAL] else 0.0
                 length = (end - time) / parts
+                matrix[:, :] = 0.0
                 for part in range(parts):
                     begin = time + part * length
-                    right[:] = 0.0
                     _step(run, begin, length, speed, roots, tips, convection, centrifugal, drag, method, state, matrix, right)
                     _solve(matrix, right)
                     _advance(run, begin, length, speed, convection, method, right, state)
