@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 PILOT_INSTANTS = 7
 SLOW_PERIODS = 10  # longest natural periods: loads that swing faster are taken to make the needle vibrate
-HISTORY_POINTS = 400
+HISTORY_POINTS = (400, 2000)  # fewest and most instants at which vibrations of two plants are compared: the outputs else
 OUTPUTS = 200
 STEPS_PER_PERIOD = 16
 SHALLOW = 0.02  # of the length: shallower `entry` needles are too stiff to matter
@@ -101,7 +101,9 @@ def tip_difference(scene: Scene, plant: Plant, finer: Plant, analysis: str = "st
     """
     if analysis != "dynamic" or not needs_no_steps(scene):
         return float(np.max(tip_differences(scene, plant, finer)))
-    times = np.linspace(0.0, run_duration(scene), HISTORY_POINTS)
+    output = scene.numerics.output_step
+    outputs = run_duration(scene) / output if isinstance(output, float) else OUTPUTS
+    times = np.linspace(0.0, run_duration(scene), round(min(max(outputs, HISTORY_POINTS[0]), HISTORY_POINTS[1])) + 1)
     coarse, fine = vibrating_tips(plant, times), vibrating_tips(finer, times)
     scale = max(float(np.max(np.abs(fine))), scene.numerics.absolute_tolerance)
     return float(np.max(np.abs(coarse - fine))) / scale

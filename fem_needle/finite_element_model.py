@@ -17,6 +17,8 @@ from fem_needle.scene import Scene
 
 ELEMENT_CHOICES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 ELEMENT_SHARE = 0.1  # of the tolerance: what the mesh may cost
+ONLY_SHARE = 0.8  # likewise, where nothing else costs anything
+BETWEEN = 1.25  # the largest difference at rest over the largest at the instants that are compared
 MESH_INSTANTS = 12
 VIBRATING = 4.0 / 3.0  # the error of a free vibration over the difference from twice as many elements: its order is 2 or more
 PILOT_ELEMENTS = 8
@@ -86,9 +88,13 @@ class Meshes:
 
         At rest at instants spread over the run; over time where the needle is held and vibrates freely.
         """
-        if self.analysis == "dynamic" and needs_no_steps(self.scene):
+        if self._needs_no_steps:
             return VIBRATING * tip_difference(self.scene, plant, finer, self.analysis)
-        return float(np.max(tip_differences(self.scene, plant, finer, MESH_INSTANTS)))
+        return BETWEEN * float(np.max(tip_differences(self.scene, plant, finer, MESH_INSTANTS)))
+
+    @property
+    def _needs_no_steps(self) -> bool:
+        return self.analysis == "dynamic" and needs_no_steps(self.scene) and self.scene.numerics.time_step == "auto"
 
     def fewest(self, allowed: float) -> int:
         """Return the fewest elements whose error is allowed; where none is, those with the smallest error."""
@@ -103,7 +109,8 @@ class Meshes:
 
     def chosen(self) -> ChosenPlant:
         """Return the needle with the fewest elements that the tips at rest allow."""
-        return self.choice(self.needle(self.fewest(ELEMENT_SHARE * self.scene.numerics.tolerance)), 0.0)
+        share = ONLY_SHARE if self._needs_no_steps else ELEMENT_SHARE
+        return self.choice(self.needle(self.fewest(share * self.scene.numerics.tolerance)), 0.0)
 
     def finer(self, plant: Plant, factor: float) -> FiniteElementNeedle | None:
         """Return the needle with ``factor`` times the elements of a plant and more than it has; None beyond the finest."""

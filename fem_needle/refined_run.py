@@ -12,10 +12,11 @@ from math import ceil, floor, inf, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from fem_needle.choices import likely_duration, longest_period
+from fem_needle.detuning import detuning
 from fem_needle.errors import ComputationError
+from fem_needle.expectation import Expectation, expectation
 from fem_needle.march import RunEnd, TimeGrid, time_grid
 from fem_needle.motion import shortest_period
 from fem_needle.run_job import Job, begin, collect, shown, stepper_of, total_error, trajectory_of
@@ -40,16 +41,11 @@ LEAST_TIME_SHARE = 0.5  # of the tolerance
 MESH_SHARE = 0.3  # of the tolerance: what the mesh may cost in motion
 VIBRATION_SHARE = 0.5  # of the tolerance: smaller vibrations need not be resolved
 TIME_ORDER = 4.0  # of the integrator with a spectral radius of 1, otherwise 3
-FIRST = 0.75  # of the method's order: what is hoped for before one is observed
-SMALLEST_ORDER = 0.5
-SAFETY = 1.25  # of an error that follows from an observed order
 LEAST_FINER = 1.3  # times as many elements: a mesh to compare with
 SURE_ORDER = 3.0  # of the mesh's error in motion, at least
 MESH_ORDER = 5.0  # of the mesh's error in motion, to guess the elements that are needed
-PROVEN = 2.5  # ratio of steps over which an observed order is trusted
 LEAST_REFINEMENT = 0.7  # largest ratio of successive steps
 SHORTEST = 0.33  # smallest ratio of successive steps
-RATIOS = (1e-3, 2.0)  # of steps, between which the one that is needed is looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,85 +83,6 @@ class _Trial:
         plant = self.job.plant
         depths = [max(sample.depth, plant.smallest_depth) for sample in self.samples]
         return np.array([plant.points(z).rows[-1] @ s.coordinates for z, s in zip(depths, self.samples, strict=True)])
-
-
-@dataclass(frozen=True)
-class Expectation:
-    """What the differences of runs with ever shorter steps let expect of the last one: an error high x^order + low x^slowest.
-
-    x is the ratio of a step to the last one; the error is that of the tip, relative to the largest tip deflection.
-
-    Attributes
-    ----------
-    high, order
-        Part that falls with the order of the method.
-    low, slowest
-        Part that falls slowly: vibrations that the steps do not resolve.
-    bound
-        On the error of the last run, by which it is accepted: what the differences show, where ``error`` is what they let hope.
-    """
-
-    high: float
-    order: float
-    low: float = 0.0
-    slowest: float = 1.0
-    bound: float = 0.0
-
-    def error(self, ratio: float = 1.0) -> float:
-        """Return the error with a step of a ratio to the last one."""
-        return self.high * ratio**self.order + self.low * ratio**self.slowest
-
-    def ratio(self, allowed: float) -> float:
-        """Return the ratio of the step that keeps an allowed error, within bounds."""
-        if self.error(RATIOS[0]) >= allowed:
-            return RATIOS[0]
-        if self.error(RATIOS[1]) <= allowed:
-            return RATIOS[1]
-        return float(brentq(lambda ratio: self.error(ratio) - allowed, *RATIOS))
-
-
-def expectation(steps: list[float], differences: list[float], order: float, *, resolved: bool = True) -> Expectation:
-    """Return what is to be expected of the last of at least two runs, with a factor of `SAFETY`.
-
-    The last two differences are those of C h^p + D h with non-negative C and D, p the order of the method; where they fall more
-    slowly than with order 1, those of one term of the order that they have. One difference proves no order, and none proves it
-    over more than a ratio of steps of `PROVEN`: slow parts hide behind the error of the run before.
-
-    Parameters
-    ----------
-    steps
-        Falling [s].
-    differences
-        Of successive runs, one less, relative to the largest tip deflection.
-    order
-        Of the method.
-    resolved
-        Whether the steps of the last run but one resolve the slowest vibration that matters. Where not, the runs differ by what
-        the vibration does, whose phase is arbitrary in both: the difference counts in full, and no order.
-    """
-    if not resolved:
-        return replace(expectation(steps, differences, order), bound=SAFETY * differences[-1])
-    last, ratio = SAFETY * differences[-1], steps[-2] / steps[-1]
-    if len(differences) < 2:
-        hoped = FIRST * order
-        return Expectation(last / (ratio**hoped - 1.0), hoped, bound=last)
-    first, before = SAFETY * differences[-2], steps[-3] / steps[-1]
-    parts = [[before**p - ratio**p for p in (order, 1.0)], [ratio**p - 1.0 for p in (order, 1.0)]]
-    high, low = np.linalg.solve(parts, [first, last])
-    proven = last / (min(ratio, PROVEN) ** order - 1.0)
-    if low <= 0.0:
-        return Expectation(last / (ratio**order - 1.0), order, bound=proven)
-    if high >= 0.0:
-        return Expectation(float(high), order, float(low), bound=max(float(high + low), proven))
-    slowest = SMALLEST_ORDER
-    if _quotient(before, ratio, slowest) < first / last:
-        slowest = float(brentq(lambda p: _quotient(before, ratio, p) - first / last, slowest, 1.0))
-    slow = last / (ratio**slowest - 1.0)
-    return Expectation(0.0, order, slow, slowest, bound=max(slow, proven))
-
-
-def _quotient(before: float, ratio: float, order: float) -> float:
-    return (before**order - ratio**order) / (ratio**order - 1.0)
 
 
 class _InterruptedError(Exception):
@@ -246,24 +163,55 @@ def _settle_mesh(search: _Search) -> _Trial:
     """Take more elements until a finer mesh moves the tip little, in runs with the coarsest step; return the last of them."""
     trial = _first_trial(search)
     for _ in range(MOST_MESHES):
-        chosen = search.job.chosen
-        ladder, plant = chosen.ladder, chosen.plant
-        finer = None if ladder is None else ladder.finer(plant, LEAST_FINER)
-        if ladder is None or finer is None:
+        better = _better_mesh(search, trial)
+        if better is None:
             break
-        other = search.run(replace(search.job, chosen=ladder.choice(finer, 0.0)), trial.step)
-        moved = difference(trial, other) / (1.0 - (plant.size / finer.size) ** SURE_ORDER)
-        allowed = MESH_SHARE * search.tolerance
-        search.job = replace(search.job, chosen=ladder.choice(plant, moved))
-        if moved <= allowed:
-            break
-        wanted = ladder.finer(plant, (moved / allowed) ** (1.0 / MESH_ORDER))
-        if wanted is None or wanted.size <= finer.size:
-            wanted, trial = finer, other
-        search.job = replace(search.job, chosen=ladder.choice(wanted, moved))
-        if trial is not other:
-            trial = search.run(search.job, trial.step)
+        trial = better
     return trial
+
+
+def _better_mesh(search: _Search, trial: _Trial) -> _Trial | None:
+    """Compare with a run on a finer mesh; return a run with the same step on the mesh that is needed, None where it is enough."""
+    chosen = search.job.chosen
+    ladder, plant, allowed = chosen.ladder, chosen.plant, MESH_SHARE * search.tolerance
+    finer = None if ladder is None else ladder.finer(plant, LEAST_FINER)
+    if ladder is None or finer is None:
+        return None
+    other = search.run(replace(search.job, chosen=ladder.choice(finer, 0.0)), trial.step)
+    moved = difference(trial, other) / (1.0 - (plant.size / finer.size) ** SURE_ORDER)
+    search.job = replace(search.job, chosen=ladder.choice(plant, moved))
+    if moved <= allowed:
+        return None
+    wanted = ladder.finer(plant, (moved / allowed) ** (1.0 / MESH_ORDER))
+    if wanted is None or wanted.size <= finer.size:
+        wanted = finer
+    search.job = replace(search.job, chosen=ladder.choice(wanted, moved))
+    return other if wanted is finer else search.run(search.job, trial.step)
+
+
+def _follows_vibrations(search: _Search, swing: float) -> bool:
+    """Return whether the mesh is fine enough for vibrations as large as the difference of the two coarsest runs."""
+    chosen = search.job.chosen
+    finer = None if chosen.ladder is None else chosen.ladder.finer(chosen.plant, LEAST_FINER)
+    if finer is None or resolving_step(search.job) == inf:
+        return True
+    if search.job.scene.initial.shape != "equilibrium":  # let go: what the mesh does to a shape shows as it swings
+        return False
+    return swing * detuning(chosen.plant, finer) <= MESH_SHARE * search.tolerance
+
+
+def _settle_vibrations(search: _Search, coarser: _Trial, final: _Trial) -> None:
+    """Compare meshes with a step that follows the vibrations, and run again on a finer one where they differ."""
+    first = coarser
+    for _ in range(MOST_MESHES):
+        better = _better_mesh(search, coarser)
+        if better is None:
+            break
+        coarser = better
+    if coarser is not first:
+        final = search.run(search.job, final.step, final=True)
+    search.trials.remove(final)
+    search.trials.append(final)
 
 
 def _first_trial(search: _Search) -> _Trial:
@@ -287,6 +235,8 @@ def _find_step(search: _Search, first: _Trial) -> None:
         expected = expectation([run.step for run in runs], differences, order, resolved=resolved)
         search.error = expected.bound
         if search.error <= search.allowed and runs[-1].is_whole:
+            if not _follows_vibrations(search, differences[0]):
+                _settle_vibrations(search, *runs[-2:])
             return
         ratio = next_ratio(expected, AIM * search.allowed)
         if len(search.trials) >= MOST_RUNS or runs[-1].end.steps / ratio > MOST_STEPS:
@@ -347,7 +297,7 @@ def resolving_step(job: Job) -> float:
 def coarsest_step(job: Job) -> float:
     """Return the step [s] of the first trial run: loads are just resolved, and vibrations that matter show in its differences.
 
-    With a spectral radius of 1 a vibration of omega h >> 1 appears to turn by 12 / (omega h) in a step h, by 12 T / (omega h^2) in
+    With a spectral radius of 1 a vibration of large omega h appears to turn by 12 / (omega h) in a step h, 12 T / (omega h^2) in
     the run: runs with different steps disagree about it long before they resolve it. Otherwise it is damped out, and nothing
     would show it.
     """

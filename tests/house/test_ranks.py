@@ -68,6 +68,8 @@ RANKS = {
     "inertia_effect": 11,
     "trajectory": 11,
     "choices": 12,
+    "detuning": 13,
+    "expectation": 1,
     "finite_element_model": 13,
     "series_file": 12,
     "vtk_export": 12,

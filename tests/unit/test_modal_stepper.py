@@ -78,3 +78,13 @@ def test_a_step_that_was_asked_for_is_taken():
 def test_scenes_that_need_steps(scene):
     assert not needs_no_steps(scene)
     assert all(needs_no_steps(scene) for scene in CASES.values())
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, pytest.param(1e-6, marks=pytest.mark.slow)])
+def test_a_release_keeps_its_tolerance_and_its_estimate(tolerance):
+    """Frequencies keep their digits on fine meshes: over 0.1 s the lowest vibration turns by a hundred radians."""
+    scene = load_scene("bench-d")
+    run = run_scene(scene, tolerance=tolerance)
+    exact = ReleaseFromTipForce(scene).tip_deflection(run.time)
+    error = np.max(np.abs(run.tip_deflection - exact)) / np.max(np.abs(exact))
+    assert error <= run.summary["error_estimate"] <= tolerance
