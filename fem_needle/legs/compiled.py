@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 def compiled_march(plant: Plant, stepper: DynamicStepper, grid: TimeGrid) -> Generator[Sample, None, RunEnd]:
     """Return the generator of the samples, as `fem_needle.march.march` does."""
-    return march_legs(plant, stepper, pieces_of(grid), partial(_computed, plant, stepper), grid.steps)
+    return march_legs(plant, stepper, pieces_of(grid, plant.size), partial(_computed, plant, stepper), grid.steps)
 
 
 def _computed(plant: Plant, stepper: DynamicStepper, law: DepthLaw, piece: Piece, start: StepEnd) -> tuple[Leg, int]:

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 def equilibrium_march(plant: Plant, stepper: StaticStepper, grid: TimeGrid) -> Generator[Sample, None, RunEnd]:
     """Return the generator of the samples, as `fem_needle.march.march` does."""
-    return march_legs(plant, stepper, pieces_of(grid), partial(_computed, plant, stepper), grid.steps)
+    return march_legs(plant, stepper, pieces_of(grid, plant.size), partial(_computed, plant, stepper), grid.steps)
 
 
 def _computed(plant: Plant, stepper: StaticStepper, law: DepthLaw, piece: Piece, start: StepEnd) -> tuple[Leg, int]:

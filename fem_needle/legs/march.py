@@ -25,7 +25,8 @@ from fem_needle.steppers import Stepper
 
 Array = NDArray[np.float64]
 
-MOST_STEPS = 500  # of a leg: its tables stay in the tens of megabytes
+MOST_STEPS = 500  # of a leg
+MOST_COORDINATES = 100_000  # of all steps of a leg: its tables stay in the tens of megabytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +75,14 @@ def march_legs(
     return RunEnd("final-depth" if ends_by_itself(plant.scene) else "duration", steps)
 
 
-def pieces_of(grid: TimeGrid) -> Iterator[Piece]:
-    """Cut the grid at its landings, and long stretches between them."""
+def most_steps(size: int) -> int:
+    """Return how many steps a leg may have."""
+    return max(1, min(MOST_STEPS, MOST_COORDINATES // size))
+
+
+def pieces_of(grid: TimeGrid, size: int) -> Iterator[Piece]:
+    """Cut the grid at its landings, and long stretches between them, for a plant of so many coordinates."""
+    most = most_steps(size)
     outputs, landings = set(grid.outputs), {0.0, *grid.landings}
     times: list[float] = []
     shown: list[bool] = []
@@ -90,7 +97,7 @@ def pieces_of(grid: TimeGrid) -> Iterator[Piece]:
         for number, mark in enumerate(marks[1:], start=1):
             times.append(mark)
             shown.append(number == count and end in outputs)
-            if len(shown) == MOST_STEPS:
+            if len(shown) == most:
                 yield Piece(np.array(times), np.array(shown), landed)
                 times, shown, landed = [mark], [], False
     if shown:

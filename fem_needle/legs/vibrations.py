@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fem_needle.initial import initial_state
 from fem_needle.ledger import StepEnd
 from fem_needle.legs.course import instants_of
-from fem_needle.legs.march import MOST_STEPS, Piece, march_legs
+from fem_needle.legs.march import Piece, march_legs, most_steps
 from fem_needle.legs.matrices import LegMatrices
 from fem_needle.legs.states import Leg
 from fem_needle.march import RunEnd, TimeGrid
@@ -26,11 +26,11 @@ Array = NDArray[np.float64]
 def modal_march(plant: Plant, stepper: ModalStepper, grid: TimeGrid) -> Generator[Sample, None, RunEnd]:
     """Return the generator of the samples, as `fem_needle.march.march` does."""
     vibration = Vibration(plant, initial_state(plant, depth_law(plant.scene)))
-    pieces = _pieces(grid.outputs, vibration.resolved_time)
+    pieces = _pieces(grid.outputs, vibration.resolved_time, most_steps(plant.size))
     return march_legs(plant, stepper, pieces, partial(_computed, plant, stepper, vibration), grid.steps)
 
 
-def _pieces(outputs: tuple[float, ...], resolved: float) -> Iterator[Piece]:
+def _pieces(outputs: tuple[float, ...], resolved: float, most: int) -> Iterator[Piece]:
     """Yield, for each output, a step to shortly before it and a short one, on which rates are taken; one more at the start."""
     times, shown, landed = [outputs[0], outputs[0] + resolved], [False], True
     for output in outputs[1:]:
@@ -39,7 +39,7 @@ def _pieces(outputs: tuple[float, ...], resolved: float) -> Iterator[Piece]:
             shown.append(False)
         times.append(output)
         shown.append(True)
-        if len(shown) >= MOST_STEPS:
+        if len(shown) >= most:
             yield Piece(np.array(times), np.array(shown), landed)
             times, shown, landed = [output], [], False
     if shown:

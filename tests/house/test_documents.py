@@ -56,13 +56,13 @@ def test_commands_of_the_readme_run(line, tmp_path):
     assert done.stdout
 
 
-def test_the_example_of_the_readme_runs(tmp_path, monkeypatch, capsys):
-    (example,) = blocks(README, "python")
+@pytest.mark.parametrize("example", blocks(README, "python"), ids=["one run", "many runs"])
+def test_the_examples_of_the_readme_run(example, tmp_path, monkeypatch, capsys):
     assert len(example.splitlines()) <= 15
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "README.md", "exec"), {})
     assert "mm" in capsys.readouterr().out
-    assert (tmp_path / "my-run" / "series.nc").exists()
+    assert (tmp_path / "my-run" / "series.nc").exists() == ("my-run" in example)
 
 
 def test_the_readme_lists_every_shipped_scene():
