@@ -13,6 +13,7 @@ import argparse
 import csv
 import time
 import warnings
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -52,8 +53,7 @@ def measured(seed: int, tolerance: float, seconds: float, *, fixed: bool) -> dic
     scene = random_scene(seed).with_value("numerics.tolerance", tolerance)
     row: dict[str, object] = dict.fromkeys(FIELDS, "") | {"seed": seed, "tolerance": tolerance}
     row |= {"support": scene.support.kind, "insertion": scene.insertion.kind, "initial": scene.initial.shape}
-    times = np.linspace(0.0, scene.duration, OUTPUTS + 1)
-    truth, uncertainty = true_tips(scene, times)
+    truth, uncertainty = _truth(seed)
     row |= {"uncertainty": SHARE * uncertainty}
     if SHARE * uncertainty > 0.3 * tolerance:
         return row | {"note": "truth unknown"}
@@ -69,6 +69,12 @@ def measured(seed: int, tolerance: float, seconds: float, *, fixed: bool) -> dic
     row |= {"cost": run.summary["step_unknowns"], "error": error, "estimate": run.summary["error_estimate"]}
     row |= {"note": "; ".join(text.split(":")[0] for text in run.summary["warnings"])}
     return row | (cheapest(scene, run, truth, tolerance) if fixed and error <= tolerance else {})
+
+
+@lru_cache(maxsize=1)
+def _truth(seed: int) -> tuple[np.ndarray, float]:
+    scene = random_scene(seed)
+    return true_tips(scene, np.linspace(0.0, scene.duration, OUTPUTS + 1))
 
 
 def error_of(tips: np.ndarray, truth: np.ndarray) -> float:
