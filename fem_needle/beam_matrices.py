@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
-from fem_needle.frames import Frame
+from fem_needle.frames import Depth, Frame
 from fem_needle.loads import turns_with_needle
 from fem_needle.scene import Scene
 from fem_needle.shapes import Shapes
@@ -81,7 +81,7 @@ class ScaledBeam:
             return unit
         return BeamMatrices(
             unit.mass * stretch,
-            unit.bending / stretch**3,
+            unit.bending * _bending_scale(stretch),
             unit.convection,
             None if unit.centrifugal is None else unit.centrifugal / stretch,
         )
@@ -90,7 +90,7 @@ class ScaledBeam:
         """Yield the matrices over many depths [m] (T,)."""
         stretch, unit = self.frame.stretch(depths) + 0.0 * depths, self.unit
         yield Multiple(MASS, unit.mass, stretch)
-        yield Multiple(BENDING, unit.bending, 1 / stretch**3)
+        yield Multiple(BENDING, unit.bending, _bending_scale(stretch))
         if unit.convection is not None and unit.centrifugal is not None:
             yield Multiple(CONVECTION, unit.convection, np.ones_like(depths))
             yield Multiple(CENTRIFUGAL, unit.centrifugal, 1 / stretch)
@@ -114,6 +114,11 @@ class ScaledBeam:
         growing = 0.5 * velocities @ banded.multiply(self.unit.mass, velocities)
         falling = 0.5 * (speed / depth) ** 2 * (coordinates @ banded.multiply(self.unit.centrifugal, coordinates))
         return float(growing - falling)
+
+
+def _bending_scale(stretch: Depth) -> Depth:
+    """Return 1 / h^3, to the last digit the same for one depth and for many: what both loops round alike they agree on."""
+    return 1.0 / (stretch * stretch * stretch)
 
 
 def whole_needle(shapes: Shapes, frame: Frame, scene: Scene) -> ScaledBeam:

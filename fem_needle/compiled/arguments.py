@@ -24,7 +24,7 @@ from fem_needle.tables import (
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-OPERATOR_MASS, POSITION, VELOCITY, TRANSPORT = range(4)  # as in `fem_needle.compiled.loop`
+OPERATOR_MASS, POSITION, VELOCITY, TRANSPORT, MOTION = range(5)  # as in `fem_needle.compiled.loop`
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def arguments(
         state,
         (np.zeros((kept, 2, size)), np.zeros((kept, 2, size))),
         (
-            np.zeros((2, 4, rows, size)),
+            np.zeros((2, 5, rows, size)),
             np.zeros((free, 2 * rows + 1)),
             np.zeros((4, size)),
             np.zeros((2, size)),
@@ -114,18 +114,18 @@ def _guides(points: PointTable, course: NodeCourse, kept: int, free: int) -> tup
 
 
 def _uses(matrices: Matrices, course: NodeCourse, *, inertia: bool) -> list[_Use]:
-    """Return which kinds make up which operator: E0 = K + m G + v D - v^2 R, E1 = C - v S^T, E2 = v S and M."""
+    """Return which kinds make up which operator: K + m G, v D - v^2 R, C - v S^T, v S and M."""
     speeds, one = course.speeds, np.ones_like(course.speeds)
     uses = [
         _Use(BENDING, POSITION, one),
         _Use(TISSUE, POSITION, course.factors),
         _Use(DAMPING, VELOCITY, one),
-        _Use(DRAG, POSITION, speeds),
+        _Use(DRAG, MOTION, speeds),
     ]
     if inertia:
         uses += [
             _Use(MASS, OPERATOR_MASS, one),
-            _Use(CENTRIFUGAL, POSITION, -(speeds**2)),
+            _Use(CENTRIFUGAL, MOTION, -(speeds**2)),
             _Use(CONVECTION, TRANSPORT, speeds),
             _Use(CONVECTION, VELOCITY, -speeds, transposed=True),
         ]
@@ -143,7 +143,7 @@ def _terms(matrices: Matrices, uses: list[_Use]) -> tuple:
         if base >= 0:
             where = len(bases) - 1 if use.transposed else base
             columns.append((use.operator, where, use.factor * matrices.scale[:, use.kind]))
-    sums = np.zeros((nodes, 4, len(bases)))
+    sums = np.zeros((nodes, 5, len(bases)))
     for operator, base, scale in columns:
         sums[:, operator, base] += scale
     ranges, range_scale, range_ends = _ranges(matrices, uses)

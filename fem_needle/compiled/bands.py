@@ -15,6 +15,7 @@ _ARITHMETIC: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", 
 # Without counting references, which costs more than the arithmetic: compiled code allocates nothing. Every line takes some 10 ms
 # to compile, which a user waits for once: what can be done for many steps at once is left to numpy.
 INNER = _ARITHMETIC | {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+EXACT = INNER | {"fastmath": False}  # sums of matrices are rounded as numpy rounds them, so that both loops have the same
 ENTRANCE = _ARITHMETIC | {"_nrt": False, "no_cfunc_wrapper": True, "cache": True, "nogil": True}
 
 

@@ -1,6 +1,6 @@
 """The compiled loop over steps of the collocation methods (equations: `fem_needle.stages`).
 
-A stage's equations, with operators that hold speed and swelling (`OPERATORS`): E0 = K + m G + v D - v^2 R, E1 = C - v S^T,
+A stage's equations, with operators that hold speed and swelling (`OPERATORS`): E0 = K + m G and v D - v^2 R, E1 = C - v S^T,
 E2 = v S and M,
 
     P = M q' + E2 q,   P' = -E0 q - E1 q' + N.forces.
@@ -14,17 +14,18 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fem_needle.compiled.bands import ENTRANCE, INNER, add_product, factor, solve, solve_dense
+from fem_needle.compiled.bands import ENTRANCE, EXACT, INNER, add_product, factor, solve, solve_dense
 
-OPERATORS = 4
-MASS, POSITION, VELOCITY, TRANSPORT = range(OPERATORS)  # M, E0, E1, E2
+OPERATORS = 5
+# M, K + m G, E1, E2, and v D - v^2 R: not added to the stiffness, whose every digit counts.
+MASS, POSITION, VELOCITY, TRANSPORT, MOTION = range(OPERATORS)
 
 
-@njit(**INNER)
+@njit(**EXACT)
 def _assemble(bases, local, stride, sums, ranges, range_scale, range_ends, blocks, block, operators):
-    """Add up the operators (4, 2 b + 1, n) of an instant: multiples of bases, ranges of elements of bases, small blocks.
+    """Add up the operators (5, 2 b + 1, n) of an instant: multiples of bases, ranges of elements of bases, small blocks.
 
-    ``sums`` (4, bases): multiples. ``ranges``: operator and base of each range; ``blocks``: operator and first coordinate.
+    ``sums`` (5, bases): multiples. ``ranges``: operator and base of each range; ``blocks``: operator and first coordinate.
     """
     count, rows = local.shape[2], operators.shape[1]
     for operator in range(OPERATORS):
@@ -54,7 +55,7 @@ def _assemble(bases, local, stride, sums, ranges, range_scale, range_ends, block
 
 @njit(**INNER)
 def _fill_matrix(operators, inverse, length, clamped, rows):
-    """Fill the matrix of a step from the operators (2, 4, 2 b + 1, n) at its stages."""
+    """Fill the matrix of a step from the operators (2, 5, 2 b + 1, n) at its stages."""
     middle, size = operators.shape[2] // 2, operators.shape[3]
     width = 2 * middle + 1
     rows[:, :] = 0.0
@@ -71,7 +72,7 @@ def _fill_matrix(operators, inverse, length, clamped, rows):
                     entry = first * operators[0, MASS, row, column] + second * operators[1, MASS, row, column]
                     entry += slope * (operators[stage, VELOCITY, row, column] + operators[other, TRANSPORT, row, column])
                     if stage == other:
-                        entry += operators[stage, POSITION, row, column]
+                        entry += operators[stage, POSITION, row, column] + operators[stage, MOTION, row, column]
                     rows[2 * (column + shift - clamped) + 1 - stage, diagonal] = entry
 
 
@@ -90,6 +91,7 @@ def _fill_right_side(operators, inverse, length, clamp, state, known, side, answ
     rates = known[2]
     for stage in range(2):
         add_product(operators[stage, POSITION], -1.0, known[stage], side[stage])
+        add_product(operators[stage, MOTION], -1.0, known[stage], side[stage])
         moves = False
         rates[:] = 0.0
         for index in range(clamped):
@@ -209,7 +211,7 @@ def run_steps(terms, points, course, scheme, state, kept, work, guides):
     kept
         Coordinates at the stages (kept, 2, n) and end state (kept, 2, n).
     work
-        Operators (2, 4, 2 b + 1, n), matrix (2 free, 4 b + 3), known (4, n), side (2, n), answer (2 free,), end (2, n), stages
+        Operators (2, 5, 2 b + 1, n), matrix (2 free, 4 b + 3), known (4, n), side (2, n), answer (2 free,), end (2, n), stages
         (2, n).
     guides
         None, or compliance (2 steps, guides, guides), gaps that known forces open (2 steps, guides), the record of the forces

@@ -20,7 +20,6 @@ from reduced_model import AssumedModeNeedle
 from tests.consistency.scenes import BUZZ, DAMPED, LAYERS, held, moving, profile, scene_of
 
 AGREEMENT = 1e-9  # of the largest value of the run
-ROUNDING = 5e-9  # of the largest tip: what 40 elements lose in either loop
 GUIDED = {"guides": (Guide(position=-0.03), Guide(position=-0.01, stiffness=2e3))}
 FINGER = (LateralLoad(position=-0.005, force=Table(time=[0.004, 0.01], value=[0.0, 0.5])), TipLoad(force=0.1))
 SCENES = {
@@ -109,11 +108,11 @@ def test_assumed_modes(name, basis):
 
 
 def test_forty_elements_in_a_long_run():
-    scene = scene_of("entry", moving(0.05, 0.02, 0.18), loads=(TipLoad(force=BUZZ),), duration=3.2)
+    scene = scene_of("entry", moving(0.2, 0.02, 0.18), loads=(TipLoad(force=BUZZ),), duration=0.8)
     plant = FiniteElementNeedle(scene, elements=40)
-    stepper, grid = DynamicStepper(plant, collocation(1.0)), time_grid(plant, 4e-3, 0.04)
+    stepper, grid = DynamicStepper(plant, collocation(1.0)), time_grid(plant, 1e-3, 0.04)
     tips = [np.array([s.coordinates[-2] for s in samples(loop(plant, stepper, grid))[0]]) for loop in (march, compiled_march)]
-    assert np.max(np.abs(tips[1] - tips[0])) <= ROUNDING * np.max(np.abs(tips[0]))
+    assert np.max(np.abs(tips[1] - tips[0])) <= AGREEMENT * np.max(np.abs(tips[0]))
 
 
 def test_the_scene_chooses_the_loop():
