@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy  # its parts are loaded where they are used
 
 FIRST = 0.75  # of the method's order: what is hoped for before one is observed
 SMALLEST_ORDER = 0.5
@@ -46,7 +46,7 @@ class Expectation:
             return RATIOS[0]
         if self.error(RATIOS[1]) <= allowed:
             return RATIOS[1]
-        return float(brentq(lambda ratio: self.error(ratio) - allowed, *RATIOS))
+        return float(scipy.optimize.brentq(lambda ratio: self.error(ratio) - allowed, *RATIOS))
 
 
 def expectation(steps: list[float], differences: list[float], order: float, *, resolved: bool = True) -> Expectation:
@@ -84,7 +84,7 @@ def expectation(steps: list[float], differences: list[float], order: float, *, r
         return Expectation(float(high), order, float(low), bound=max(float(high + low), proven))
     slowest = SMALLEST_ORDER
     if _quotient(before, ratio, slowest) < first / last:
-        slowest = float(brentq(lambda p: _quotient(before, ratio, p) - first / last, slowest, 1.0))
+        slowest = float(scipy.optimize.brentq(lambda p: _quotient(before, ratio, p) - first / last, slowest, 1.0))
     slow = last / (ratio**slowest - 1.0)
     return Expectation(0.0, order, slow, slowest, bound=max(slow, proven))
 

@@ -9,8 +9,8 @@ from math import inf, nextafter
 from typing import Protocol
 
 import numpy as np
+import scipy  # its parts are loaded where they are used
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from fem_needle.loads import second_derivative
 from fem_needle.rigid_push import time_to_depth
@@ -211,6 +211,6 @@ def _crossings(depth: Callable[[float], float], times: list[float], level: float
         if start == 0.0:
             yield first
         elif start * end < 0:
-            yield float(brentq(lambda time: depth(time) - level, first, second, xtol=1e-15))
+            yield float(scipy.optimize.brentq(lambda time: depth(time) - level, first, second, xtol=1e-15))
         elif end == 0.0:
             yield second

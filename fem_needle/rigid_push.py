@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.integrate import solve_ivp
+import scipy  # its parts are loaded where they are used
 
 from fem_needle import axial
 from fem_needle.errors import SceneError
@@ -37,7 +37,8 @@ def time_to_depth(scene: Scene) -> float:
         return float(state[0]) - target
 
     arrives.terminal = True  # type: ignore[attr-defined]
-    found = solve_ivp(rate, (0.0, HORIZON), [insertion.first_depth, 0.0], method="LSODA", events=arrives, max_step=HORIZON / 200)
+    start, options = [insertion.first_depth, 0.0], {"method": "LSODA", "max_step": HORIZON / 200}
+    found = scipy.integrate.solve_ivp(rate, (0.0, HORIZON), start, events=arrives, **options)
     if not len(found.t_events[0]):
         raise SceneError(
             f"run.duration: is required, because the push does not bring the needle to final_depth = {target:g} m within "

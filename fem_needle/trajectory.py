@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy  # its parts are loaded where they are used
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample
@@ -133,7 +133,7 @@ class Trajectory:
         clamp: Any = "not-a-knot"
         if np.isfinite(start):
             knots, known, clamp = np.append(start, knots), np.append(0.0, known), ((1, 0.0), (2, 0.0))
-        return np.where(stations > start, CubicSpline(knots, known, bc_type=clamp)(stations, derivative), 0.0)
+        return np.where(stations > start, scipy.interpolate.CubicSpline(knots, known, bc_type=clamp)(stations, derivative), 0.0)
 
     def save(self, folder: str | Path, *, force: bool = False) -> Path:
         """Write a run folder (docs/contract.md); refuse an existing one unless ``force``."""
