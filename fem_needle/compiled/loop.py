@@ -22,35 +22,43 @@ MASS, POSITION, VELOCITY, TRANSPORT, MOTION = range(OPERATORS)
 
 
 @njit(**EXACT)
-def _assemble(bases, local, stride, sums, ranges, range_scale, range_ends, blocks, block, operators):
+def _assemble(at, bases, local, stride, sums, ranges, range_scale, range_ends, blocks, block, operators):
     """Add up the operators (5, 2 b + 1, n) of an instant: multiples of bases, ranges of elements of bases, small blocks.
 
-    ``sums`` (5, bases): multiples. ``ranges``: operator and base of each range; ``blocks``: operator and first coordinate.
+    ``at``: the instant. ``sums``: multiples. ``ranges``: operator and base of each range; ``blocks``: operator and first
+    coordinate.
     """
-    count, rows = local.shape[2], operators.shape[1]
     for operator in range(OPERATORS):
-        for row in range(rows):
+        for row in range(operators.shape[1]):
             target = operators[operator, row]
-            target[:] = 0.0
+            for column in range(len(target)):
+                target[column] = 0.0
             for base in range(bases.shape[0]):
-                scale = sums[operator, base]
+                scale = sums[at, operator, base]
                 if scale != 0.0:
                     source = bases[base, row]
                     for column in range(len(target)):
                         target[column] += scale * source[column]
+    _add_parts(at, local, stride, ranges, range_scale, range_ends, blocks, block, operators)
+
+
+@njit(**EXACT)
+def _add_parts(at, local, stride, ranges, range_scale, range_ends, blocks, block, operators):
+    """Add ranges of elements, and blocks."""
+    count, rows = local.shape[2], operators.shape[1]
     for number in range(ranges.shape[0]):
-        base, scale = ranges[number, 1], range_scale[number]
-        for element in range(range_ends[number, 0], range_ends[number, 1]):
+        base, scale = ranges[number, 1], range_scale[at, number]
+        for element in range(range_ends[at, number, 0], range_ends[at, number, 1]):
             for row in range(count):
                 for column in range(count):
                     entry = scale * local[base, element, row, column]
                     operators[ranges[number, 0], rows // 2 + row - column, stride * element + column] += entry
-    for number in range(blocks.shape[0]):
-        first = blocks[number, 1]
-        for row in range(block.shape[1]):
-            for column in range(block.shape[1]):
-                entry = block[number, row, column]
-                operators[blocks[number, 0], rows // 2 + row - column, first + column] += entry
+    for number in range(blocks.shape[1]):
+        first = blocks[at, number, 1]
+        for row in range(block.shape[2]):
+            for column in range(block.shape[2]):
+                entry = block[at, number, row, column]
+                operators[blocks[at, number, 0], rows // 2 + row - column, first + column] += entry
 
 
 @njit(**INNER)
@@ -77,25 +85,26 @@ def _fill_matrix(operators, inverse, length, clamped, rows):
 
 
 @njit(**INNER)
-def _fill_right_side(operators, inverse, length, clamp, state, known, side, answer):
+def _fill_right_side(first, operators, inverse, length, clamp, state, known, side, answer):
     """Fill the right-hand side with what the increments do not change; returns the stages' coordinates without them in ``known``.
 
-    The clamp moves as ``clamp`` says (stage, deflection and angle or their rates, two numbers), the rest stays.
+    The clamp moves as ``clamp`` says (instant, deflection and angle or their rates, two numbers), the rest stays.
     """
     size, clamped = state.shape[1], clamp.shape[2]
     for stage in range(2):
         for index in range(size):
             known[stage, index], side[stage, index] = state[0, index], 0.0
         for index in range(clamped):
-            known[stage, index] = clamp[stage, 0, index]
+            known[stage, index] = clamp[first + stage, 0, index]
     rates = known[2]
     for stage in range(2):
         add_product(operators[stage, POSITION], -1.0, known[stage], side[stage])
         add_product(operators[stage, MOTION], -1.0, known[stage], side[stage])
         moves = False
-        rates[:] = 0.0
+        for index in range(size):
+            rates[index] = 0.0
         for index in range(clamped):
-            rates[index] = clamp[stage, 1, index]
+            rates[index] = clamp[first + stage, 1, index]
             moves = moves or rates[index] != 0.0
         if moves:
             add_product(operators[stage, VELOCITY], -1.0, rates, side[stage])
@@ -112,13 +121,14 @@ def _fill_right_side(operators, inverse, length, clamp, state, known, side, answ
 
 
 @njit(**INNER)
-def _add_forces(rows, firsts, forces, clamped, stage, answer):
-    """Add forces at points, whose rows (points, m) begin at the coordinates ``firsts``, to a stage's right-hand side."""
-    for point in range(len(forces)):
-        for column in range(rows.shape[1]):
-            index = firsts[point] + column - clamped
+def _add_forces(at, rows, firsts, loads, clamped, stage, answer):
+    """Add the loads, the last points, whose rows (instants, points, m) begin at ``firsts``, to a stage's right-hand side."""
+    skipped = rows.shape[1] - loads.shape[1]
+    for load in range(loads.shape[1]):
+        for column in range(rows.shape[2]):
+            index = firsts[at, skipped + load] + column - clamped
             if index >= 0:
-                answer[2 * index + 1 - stage] += forces[point] * rows[point, column]
+                answer[2 * index + 1 - stage] += loads[at, load] * rows[at, skipped + load, column]
 
 
 @njit(**INNER)
@@ -157,17 +167,17 @@ def _hold_guides(first, matrix, rows, firsts, known, clamped, answer, target, gu
 
 
 @njit(**INNER)
-def _finish(operators, inverse, length, end_shares, clamp_rates, known, answer, stages, end, state):
+def _finish(first, operators, inverse, length, end_shares, clamp, known, answer, stages, end, state):
     """Set the stages (2, n) and the state at the end, coordinates and momentum (2, n), from the increments."""
-    size, clamped = state.shape[1], clamp_rates.shape[1]
+    size, clamped = state.shape[1], clamp.shape[2]
     rates, momentum = known[2], known[3]
     for index in range(size):
         end[0, index], end[1, index] = state[0, index], state[1, index]
     for stage in range(2):
-        rates[:] = 0.0
-        momentum[:] = 0.0
+        for index in range(size):
+            rates[index], momentum[index] = 0.0, 0.0
         for index in range(clamped):
-            rates[index] = clamp_rates[stage, index]
+            rates[index] = clamp[first + stage, 1, index]
         for index in range(size - clamped):
             early, late = answer[2 * index + 1], answer[2 * index]
             rates[clamped + index] = (inverse[stage, 0] * early + inverse[stage, 1] * late) / length
@@ -224,22 +234,23 @@ def run_steps(terms, points, course, scheme, state, kept, work, guides):
     inverse, end_shares = scheme
     kept_stages, kept_ends = kept
     operators, matrix, known, side, answer, end, stages = work
-    clamped, width, skipped = end_clamp.shape[1], matrix.shape[1] // 2, rows.shape[1] - loads.shape[1]
+    clamped, width = end_clamp.shape[1], matrix.shape[1] // 2
     for step in range(len(lengths)):
         length, first = lengths[step], 2 * step
-        answer[:] = 0.0
+        for index in range(len(answer)):
+            answer[index] = 0.0
         for stage in range(2):
             at, part = first + stage, operators[stage]
-            _assemble(bases, local, stride, sums[at], ranges, range_scale[at], range_ends[at], blocks[at], block[at], part)
-            _add_forces(rows[at, skipped:], firsts[at, skipped:], loads[at], clamped, stage, answer)
+            _assemble(at, bases, local, stride, sums, ranges, range_scale, range_ends, blocks, block, part)
+            _add_forces(at, rows, firsts, loads, clamped, stage, answer)
         _fill_matrix(operators, inverse, length, clamped, matrix)
-        _fill_right_side(operators, inverse, length, clamp[first : first + 2], state, known, side, answer)
+        _fill_right_side(first, operators, inverse, length, clamp, state, known, side, answer)
         if not factor(matrix, width):
             return step
         solve(matrix, width, answer)
         if guides is not None:
             _hold_guides(first, matrix, rows, firsts, known, clamped, answer, target[step], guides)
-        if not _finish(operators, inverse, length, end_shares, clamp[first : first + 2, 1], known, answer, stages, end, state):
+        if not _finish(first, operators, inverse, length, end_shares, clamp, known, answer, stages, end, state):
             return step
         for index in range(clamped):
             end[0, index] = end_clamp[step, index]
