@@ -123,9 +123,11 @@ class WholeNeedle:
             return nothing, nothing
         stepped, unit = self.rest(float(self.loading.law.depth(zero)[0]) + 1e-30j)
         q, slope = stepped.real, stepped.imag / 1e-30
-        if initial.shape == "tip-displaced":
-            tip = self.functions(np.ones(1))[0][0]
-            missing = initial.tip_deflection - tip[OWN] @ q - tip[HUB] @ self.hub_motion(zero)[0][0]
+        if initial.shape == "tip-displaced":  # no load but a tip force, beside what the hub itself displaces
+            tip, hub = self.functions(np.ones(1))[0][0], self.hub_motion(zero)[0]
+            stiffness = self.stiffness(self.loading.law.depth(zero), zero)
+            q = -np.linalg.solve(stiffness[0, OWN, OWN], _times(stiffness, hub)[0])
+            missing = initial.tip_deflection - tip[OWN] @ q - tip[HUB] @ hub[0]
             return q + unit.real * missing / (tip[OWN] @ unit.real), nothing
         return q, self.mass[OWN, OWN] @ slope * self.loading.law.speed(zero)[0]
 
