@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle import banded
 from fem_needle.collocation import Collocation
 from fem_needle.tables import (
     ABSENT,
@@ -139,7 +140,7 @@ def _terms(matrices: Matrices, uses: list[_Use]) -> tuple:
     for use in uses:
         base = int(matrices.base_of[use.kind])
         if base >= 0 and use.transposed:
-            bases.append(_transposed(matrices.bases[base]))
+            bases.append(banded.transpose(matrices.bases[base]))
         if base >= 0:
             where = len(bases) - 1 if use.transposed else base
             columns.append((use.operator, where, use.factor * matrices.scale[:, use.kind]))
@@ -173,18 +174,6 @@ def _blocks(matrices: Matrices, uses: list[_Use]) -> tuple[Indices, Array]:
         numbers[:, column, 0], numbers[:, column, 1] = use.operator, matrices.block_first[:, n]
         entries[:, column] = use.factor[:, None, None] * (block.transpose(0, 2, 1) if use.transposed else block)
     return numbers, entries
-
-
-def _transposed(band: Array) -> Array:
-    """Return the band storage of the transpose."""
-    rows, size = band.shape
-    result = np.zeros_like(band)
-    for row in range(rows):
-        shift = row - rows // 2
-        first, stop = max(0, -shift), min(size, size - shift)
-        if stop > first:
-            result[rows - 1 - row, first + shift : stop + shift] = band[row, first:stop]
-    return result
 
 
 def at_nodes(table: OperatorTable) -> OperatorTable:

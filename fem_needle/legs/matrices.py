@@ -35,36 +35,23 @@ class LegMatrices:
         # A diagonal above the main one is counted from its own column in both storages.
         return [sparse.dia_array((base, offsets), shape=(size, size)).tocsr() for base in self.matrices.bases]
 
-    def product(self, kind: int, at: Indices, vectors: Array) -> Array:
-        """Return A x, zeros where the kind is absent."""
+    def product(self, kind: int, at: Indices, vectors: Array, *, transposed: bool = False) -> Array:
+        """Return A x, or A^T x, zeros where the kind is absent."""
         if not self.has(kind):
             return np.zeros_like(vectors)
         base = self.matrices.base_of[kind]
         if base >= 0:
-            return (self._sparse[base] @ vectors.T).T * self.matrices.scale[at, kind][:, None]
+            matrix = self._sparse[base].T if transposed else self._sparse[base]
+            return (matrix @ vectors.T).T * self.matrices.scale[at, kind][:, None]
         bands, result = self.bands(kind, at), np.zeros_like(vectors)
         rows, size = bands.shape[1:]
         for row in range(rows):
             shift = row - rows // 2
             first, stop = max(0, -shift), min(size, size - shift)
             if stop > first:
-                result[:, first + shift : stop + shift] += bands[:, row, first:stop] * vectors[:, first:stop]
-        return result
-
-    def transposed_product(self, kind: int, at: Indices, vectors: Array) -> Array:
-        """Return A^T x."""
-        if not self.has(kind):
-            return np.zeros_like(vectors)
-        base = self.matrices.base_of[kind]
-        if base >= 0:
-            return (self._sparse[base].T @ vectors.T).T * self.matrices.scale[at, kind][:, None]
-        bands, result = self.bands(kind, at), np.zeros_like(vectors)
-        rows, size = bands.shape[1:]
-        for row in range(rows):
-            shift = row - rows // 2
-            first, stop = max(0, -shift), min(size, size - shift)
-            if stop > first:
-                result[:, first:stop] += bands[:, row, first:stop] * vectors[:, first + shift : stop + shift]
+                columns, lines = slice(first, stop), slice(first + shift, stop + shift)
+                target, source = (columns, lines) if transposed else (lines, columns)
+                result[:, target] += bands[:, row, columns] * vectors[:, source]
         return result
 
     def form(self, kind: int, at: Indices, left: Array, right: Array) -> Array:

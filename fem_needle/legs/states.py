@@ -152,7 +152,7 @@ class Leg:
         """Return v S^T q' + v^2 R q - (K + m G) q - C q' - v D q with given velocities (instants, n)."""
         matrices, coordinates = self.matrices, self.coordinates[at]
         speeds = self.instants.speeds[at][:, None]
-        result = speeds * matrices.transposed_product(CONVECTION, at, velocities)
+        result = speeds * matrices.product(CONVECTION, at, velocities, transposed=True)
         result += speeds**2 * matrices.product(CENTRIFUGAL, at, coordinates)
         result -= matrices.product(BENDING, at, coordinates)
         return result - self.tissue_forces(at, velocities)
