@@ -25,6 +25,7 @@ from fem_needle.tables import (
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+SAME_LENGTH = 1e-12  # of a step: two lengths that differ by less are one, rounded
 OPERATOR_MASS, POSITION, VELOCITY, TRANSPORT, MOTION = range(5)  # as in `fem_needle.compiled.loop`
 
 
@@ -78,10 +79,12 @@ def arguments(
     size, rows = state.shape[1], matrices.bases.shape[1]
     clamp = np.ascontiguousarray(np.stack([course.clamp, course.clamp_rates], axis=1)[:, :, :clamped])
     kept, free = 1 + int(np.max(course.kept, initial=-1)), 2 * (size - clamped)
+    terms = _terms(matrices, _uses(matrices, course, inertia=inertia))
+    end_clamp = np.ascontiguousarray(course.end_clamp[:, :clamped])
     return (
-        _terms(matrices, _uses(matrices, course, inertia=inertia)),
+        terms,
         (points.rows, points.first),
-        (course.lengths, course.forces, clamp, np.ascontiguousarray(course.end_clamp[:, :clamped]), course.kept),
+        (course.lengths, course.forces, clamp, end_clamp, course.kept, _is_new(terms, course.lengths)),
         (method.inverse, method.end),
         state,
         (np.zeros((kept, 2, size)), np.zeros((kept, 2, size))),
@@ -96,6 +99,17 @@ def arguments(
         ),
         _guides(points, course, kept, free) if points.guides else None,
     )
+
+
+def _is_new(terms: tuple, lengths: Array) -> NDArray[np.bool_]:
+    """Return whether a step has another length or other operators than the one before (steps,): its matrix is factored anew."""
+    result = np.ones(len(lengths), dtype=np.bool_)
+    result[1:] = np.abs(np.diff(lengths)) > SAME_LENGTH * lengths[1:]
+    _, _, _, sums, _, range_scale, range_ends, blocks, block = terms
+    for values in (sums, range_scale, range_ends, blocks, block):
+        steps = values.reshape(len(lengths), -1)
+        result[1:] |= np.any(steps[1:] != steps[:-1], axis=1)
+    return result
 
 
 def _guides(points: PointTable, course: NodeCourse, kept: int, free: int) -> tuple:

@@ -212,8 +212,8 @@ def run_steps(terms, points, course, scheme, state, kept, work, guides):
     points
         Rows (2 steps, points, m) and first coordinates, the guides first.
     course
-        Lengths of the steps, loads (2 steps, loads), clamp (2 steps, 2, clamped), clamp at the ends (steps, clamped), and the row
-        of ``kept`` that receives each step, -1: none.
+        Lengths of the steps, loads (2 steps, loads), clamp (2 steps, 2, clamped), clamp at the ends (steps, clamped), the row of
+        ``kept`` that receives each step, -1: none, and whether a step has other operators than the one before (steps,).
     scheme
         A^-1 (2, 2) and b A^-1 (2,).
     state
@@ -230,7 +230,7 @@ def run_steps(terms, points, course, scheme, state, kept, work, guides):
     """
     bases, local, stride, sums, ranges, range_scale, range_ends, blocks, block = terms
     rows, firsts = points
-    lengths, loads, clamp, end_clamp, target = course
+    lengths, loads, clamp, end_clamp, target, is_new = course
     inverse, end_shares = scheme
     kept_stages, kept_ends = kept
     operators, matrix, known, side, answer, end, stages = work
@@ -241,12 +241,14 @@ def run_steps(terms, points, course, scheme, state, kept, work, guides):
             answer[index] = 0.0
         for stage in range(2):
             at, part = first + stage, operators[stage]
-            _assemble(at, bases, local, stride, sums, ranges, range_scale, range_ends, blocks, block, part)
+            if is_new[step]:
+                _assemble(at, bases, local, stride, sums, ranges, range_scale, range_ends, blocks, block, part)
             _add_forces(at, rows, firsts, loads, clamped, stage, answer)
-        _fill_matrix(operators, inverse, length, clamped, matrix)
+        if is_new[step]:
+            _fill_matrix(operators, inverse, length, clamped, matrix)
+            if not factor(matrix, width):
+                return step
         _fill_right_side(first, operators, inverse, length, clamp, state, known, side, answer)
-        if not factor(matrix, width):
-            return step
         solve(matrix, width, answer)
         if guides is not None:
             _hold_guides(first, matrix, rows, firsts, known, clamped, answer, target[step], guides)

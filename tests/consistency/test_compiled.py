@@ -8,6 +8,7 @@ import pytest
 from fem_needle import FiniteElementNeedle, SceneError, loops, simulate
 from fem_needle.collocation import collocation
 from fem_needle.errors import ComputationError
+from fem_needle.legs import compiled
 from fem_needle.legs.compiled import compiled_march
 from fem_needle.legs.equilibria import equilibrium_march
 from fem_needle.legs.vibrations import modal_march
@@ -163,3 +164,17 @@ def test_without_numba_the_steps_are_taken_in_numpy(monkeypatch):
     monkeypatch.setattr(loops, "find_spec", lambda name: None)
     assert not is_compiled(plant, stepper, grid)
     assert len(samples(run_loop(plant, stepper, time_grid(plant, 1e-3, 1e-2)))[0]) == 3
+
+
+@pytest.mark.parametrize(("insertion", "factored"), [(held(0.1), 1), (moving(0.5, 0.02, 0.06), 20)], ids=["held", "moving"])
+def test_only_what_changes_is_factored_anew(monkeypatch, insertion, factored):
+    counted, run = [], compiled.run_steps
+
+    def counting(*given):
+        counted.append(int(np.sum(given[2][-1])))
+        return run(*given)
+
+    monkeypatch.setattr(compiled, "run_steps", counting)
+    plant = FiniteElementNeedle(scene_of("entry", insertion, DAMPED, (TipLoad(force=BUZZ),), duration=0.02), elements=4)
+    samples(compiled_march(plant, DynamicStepper(plant, collocation(1.0)), time_grid(plant, 1e-3, 2e-2)))
+    assert counted == [factored]
