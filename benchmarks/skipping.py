@@ -1,6 +1,6 @@
 """What each rule of `fem_needle.skipping` saves: the same scene with a term that has no effect, and without it.
 
-Usage: python -m benchmarks.skipping [--repeats N]. Runs alternate; the table shows medians and the smallest and largest time of a run.
+Usage: python -m benchmarks.skipping [--repeats N]. Runs alternate; shown are medians and the smallest and largest time of a run.
 """
 
 from __future__ import annotations
