@@ -16,8 +16,8 @@ from fem_needle.pictures import COLORS, INK, new_figure, png_bytes, shared_style
 PANEL_WIDTH, PANEL_HEIGHT = 3.9, 3.5  # inches
 COLUMNS = 3
 FLOOR = 1e-13  # smaller errors are drawn here
-DASHES: dict[str, Any] = {OWN: "-", EXACT: "-", LIBRARY: (0, (5, 2)), RIVAL: (0, (1.5, 1.5))}
-SHAPES = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p", "h", "d", "8", "H", "*")
+DASHES: dict[str, Any] = {OWN: "-", EXACT: (0, (5, 1.5, 1, 1.5)), LIBRARY: (0, (5, 2)), RIVAL: (0, (1.5, 1.5))}
+SHAPES = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p", "h", "d", "*", "1", "2", "3")
 MILLISECONDS = 1e3
 
 
@@ -74,5 +74,6 @@ def _legend(axes: Axes, styles: dict[str, dict[str, Any]]) -> None:
     lines = [Line2D([], [], label=name, **style) for name, style in styles.items()]
     lines.append(Line2D([], [], label="goal", marker="x", markersize=9, markeredgewidth=2.2, color=INK, linestyle="none"))
     axes.axis("off")
-    axes.legend(handles=lines, loc="center left", frameon=False, fontsize=8.5, handlelength=3.0, borderaxespad=0.0)
-    axes.set_title("left and down is better\nerrors below 1e-13 are drawn at 1e-13", loc="left", fontsize=9)
+    title = "left and down is better\nerrors below 1e-13 are drawn at 1e-13"
+    style: dict[str, Any] = {"frameon": False, "fontsize": 8, "title_fontsize": 8, "handlelength": 3.2, "labelspacing": 0.3}
+    axes.legend(handles=lines, loc="center left", title=title, alignment="left", borderaxespad=0.0, **style)
