@@ -137,18 +137,6 @@ class Meshes:
         return round_off(plant, depth, time)
 
 
-def choose_elements(scene: Scene, analysis: str) -> tuple[int, float]:
-    """Return the fewest elements whose tips agree with twice as many, and the difference that remains."""
-    meshes = Meshes(scene, analysis)
-    count = meshes.fewest(ELEMENT_SHARE * scene.numerics.tolerance)
-    return count, meshes.error(count)
-
-
-def mesh_error(scene: Scene, plant: Plant, finer: int, analysis: str = "static") -> float:
-    """Return the largest difference of tips from those on a finer mesh, relative to the largest tip."""
-    return tip_difference(scene, plant, FiniteElementNeedle(scene, elements=finer), analysis)
-
-
 def _given_mesh(scene: Scene, parts: int) -> FiniteElementNeedle:
     """Return the needle with every element of the scene's own mesh cut into one or two equal parts."""
     numerics = scene.numerics

@@ -79,10 +79,6 @@ class Unit:
         divisor = _DIVISORS.get(self.size)
         return number * self.size if divisor is None else number / divisor
 
-    def from_si(self, number: float) -> float:
-        """Return an SI ``number`` in this unit."""
-        return number / self.size
-
 
 def dimension_name(dimension: Dimension) -> str:
     """Return the name of a dimension, e.g. ``speed``."""

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from fem_needle import FiniteElementNeedle, SceneError, solve_static
-from fem_needle.choices import choose, first_time_step
+from fem_needle.choices import choose, first_time_step, tip_difference
 from fem_needle.exact import exact_static, natural_frequencies
-from fem_needle.finite_element_model import choose_elements, mesh_error
+from fem_needle.finite_element_model import FAMILY
 from fem_needle.scene import Layer, Sinusoid, TipLoad
 from tests.consistency.scenes import GEL, characteristic_modulus, held, moving, scene_of
 
@@ -18,18 +18,18 @@ def chosen(scene):
 def test_the_mesh_keeps_the_tip_within_the_tolerance(tolerance, number):
     layers = (Layer(foundation_modulus=characteristic_modulus(number)),)
     scene = scene_of("hub", held(0.1), layers, numerics={"tolerance": tolerance})
-    elements, estimate = choose_elements(scene, "static")
+    found = FAMILY.choose(scene, "static")
     exact = exact_static(scene, 0.1).tip_deflection
-    error = abs(solve_static(FiniteElementNeedle(scene, elements=elements), depth=0.1).tip_deflection / exact - 1.0)
+    error = abs(solve_static(found.plant, depth=0.1).tip_deflection / exact - 1.0)
     assert error < 0.5 * tolerance
-    assert estimate <= 0.1 * tolerance
-    assert error < 2.0 * estimate + 1e-9
+    assert found.error <= 0.1 * tolerance
+    assert error < 2.0 * found.error + 1e-9
 
 
 def test_more_accuracy_needs_more_elements():
     layers = (Layer(foundation_modulus=characteristic_modulus(12.0)),)
     scenes = [scene_of("hub", held(0.1), layers, numerics={"tolerance": tolerance}) for tolerance in (1e-2, 1e-4, 1e-6)]
-    counts = [choose_elements(scene, "static")[0] for scene in scenes]
+    counts = [FAMILY.choose(scene, "static").plant.mesh.elements for scene in scenes]
     assert counts == sorted(set(counts))
 
 
@@ -38,7 +38,7 @@ def test_mesh_error_is_that_of_the_tip():
     plant = FiniteElementNeedle(scene, elements=2)
     exact = exact_static(scene, 0.1).tip_deflection
     true = abs(solve_static(plant, depth=0.1).tip_deflection / exact - 1.0)
-    assert mesh_error(scene, plant, 32) == pytest.approx(true, rel=1e-2)
+    assert tip_difference(scene, plant, FiniteElementNeedle(scene, elements=32)) == pytest.approx(true, rel=1e-2)
 
 
 def test_an_analysis_that_was_asked_for_is_obeyed():
