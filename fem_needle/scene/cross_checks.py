@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from fem_needle.mesh_file import length_mistake
-from fem_needle.scene.loads import LateralLoad
+from fem_needle.scene.loads import LateralLoad, TipLoad
 from fem_needle.scene.part import Mistake
 from fem_needle.scene.settings import FIXED_FRAME_VARIANTS
+from fem_needle.scene.steering import IMAGE_ERROR
 
 if TYPE_CHECKING:
     from fem_needle.scene.scene import Scene
@@ -33,6 +34,7 @@ def cross_mistakes(scene: Scene) -> Iterator[Mistake]:
     else:
         yield from _entry_mistakes(scene)
     yield from _mesh_mistakes(scene)
+    yield from _steering_mistakes(scene)
 
 
 def _depth_mistakes(scene: Scene) -> Iterator[Mistake]:
@@ -118,3 +120,57 @@ def _mesh_mistakes(scene: Scene) -> Iterator[Mistake]:
     message = None if mesh is None else length_mistake(mesh, scene.needle.length)
     if mesh is not None and message is not None:
         yield Mistake("numerics.mesh", message, mesh[-1])
+
+
+def input_obstacle(scene: Scene, name: str) -> str | None:
+    """Return why a scene has no such input, None where it has."""
+    support, is_hub = scene.support, scene.support.kind == "hub"
+    lateral = sum(isinstance(load, LateralLoad) for load in scene.loads)
+    free = support.hub_rotation == "free"
+    obstacles = {
+        "push_force": (scene.insertion.kind == "force", "needs insertion.kind = 'force'"),
+        "speed": (scene.insertion.kind == "speed", "needs insertion.kind = 'speed'"),
+        "lateral_force": (lateral == 1, f"needs one load of kind 'lateral' (got {lateral})"),
+        "hub_deflection": (is_hub, "needs the support 'hub'"),
+        "hub_angle": (is_hub and not free, "needs the support 'hub' with hub_rotation = 'fixed'"),
+        "hub_torque": (is_hub and free, "needs the support 'hub' with hub_rotation = 'free'"),
+        "tip_direction": (any(isinstance(load, TipLoad) for load in scene.loads), "needs a load of kind 'tip'"),
+    }
+    possible, need = obstacles.get(name, (False, f"is unknown (allowed {', '.join(obstacles)})"))
+    return None if possible else need
+
+
+def _steering_mistakes(scene: Scene) -> Iterator[Mistake]:
+    """Report inputs that the scene has not, outputs that no sensor reads, and readings of two sensors."""
+    names: list[str] = []
+    for index, sensor in enumerate(scene.sensors):
+        if set(names) & set(sensor.readings):
+            message = f"two sensors read the same (got '{sensor.kind}' twice; allowed once)"
+            yield Mistake(f"sensors.{index}.kind", message, sensor.kind)
+        names += sensor.readings
+    for name in type(scene.actuators).model_fields:
+        obstacle = input_obstacle(scene, name)
+        if getattr(scene.actuators, name) is not None and obstacle:
+            yield Mistake(f"actuators.{name}", f"{obstacle}")
+    if scene.target.depth is not None and scene.target.depth > scene.needle.length:
+        limits = f"got {scene.target.depth:g}; allowed 0 to {scene.needle.length:g} m"
+        yield Mistake("target.depth", f"deeper than the needle is long ({limits})", scene.target.depth)
+    if scene.scatter.entry_angle and scene.support.kind != "hub":
+        yield Mistake("scatter.entry_angle", "needs the support 'hub' (allowed 0)", scene.scatter.entry_angle)
+    if scene.controller.kind != "none" and scene.controller.variant != "fully-actuated":
+        yield from _controller_mistakes(scene, names)
+
+
+def _controller_mistakes(scene: Scene, names: list[str]) -> Iterator[Mistake]:
+    controller = scene.controller
+    obstacle = input_obstacle(scene, controller.input)
+    if obstacle:
+        yield Mistake("controller.input", f"'{controller.input}' {obstacle}", controller.input)
+    needed = {"tip_deflection", "tissue_displacement"} if controller.output == IMAGE_ERROR else {controller.output}
+    if controller.variant == "as-printed":
+        needed = {"needle_angle", "tissue_deformation"}
+    if controller.kind == "inverse-dynamics" or controller.schedule == "model-gain":
+        needed |= {"depth"}
+    if needed - set(names):
+        missing = ", ".join(sorted(needed - set(names)))
+        yield Mistake("sensors", f"no sensor reads {missing}, which the controller needs (add one, such as kind = 'tip-imaging')")

@@ -9,7 +9,7 @@ from fem_needle.scene.needle import Needle
 from fem_needle.scene.part import Part
 
 # Keys of a scene file that hold lists.
-LISTS = {"guides", "layers", "loads"}
+LISTS = {"guides", "layers", "loads", "sensors"}
 
 
 def plain(value: Any, *, complete: bool) -> Any:

@@ -18,6 +18,7 @@ from fem_needle.scene.part import Part, raise_mistakes, shown
 from fem_needle.scene.plain_data import plain, with_entry
 from fem_needle.scene.quantity import Quantity
 from fem_needle.scene.settings import Friction, Initial, Model, Numerics, Run
+from fem_needle.scene.steering import Actuators, Controller, Scatter, Sensor, Target
 from fem_needle.scene.support import Support
 from fem_needle.scene.tissue import Tissue
 
@@ -42,6 +43,11 @@ class Scene(Part):
     friction: Friction = Friction()
     loads: tuple[Load, ...] = ()
     initial: Initial = Initial()
+    target: Target = Target()
+    sensors: tuple[Sensor, ...] = ()
+    controller: Controller = Controller()
+    actuators: Actuators = Actuators()
+    scatter: Scatter = Scatter()
     run: Run = Run()
     model: Model = Model()
     numerics: Numerics = Numerics()

@@ -1,0 +1,360 @@
+"""A closed loop: target, sensors, controller, actuators, and what differs from one repetition to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import model_validator
+
+from fem_needle.scene.part import Mistake, Part, raise_mistakes, shown
+from fem_needle.scene.quantity import Quantity
+from fem_needle.scene.units import to_si
+
+SensorKind = Literal["tip-imaging", "tissue-deformation", "base-force", "base-moment", "needle-shape", "encoder"]
+ControllerKind = Literal["none", "pid", "inverse-dynamics", "incremental", "proportional"]
+InputName = Literal["push_force", "speed", "lateral_force", "hub_deflection", "hub_angle", "hub_torque", "tip_direction"]
+
+# Name of each reading of a kind of sensor, with unit and meaning.
+READINGS: dict[str, dict[str, tuple[str, str]]] = {
+    "tip-imaging": {
+        "tip_deflection": ("m", "lateral place of the tip in the image"),
+        "needle_angle": ("rad", "angle of the line from the entry point to the tip in the image"),
+    },
+    "tissue-deformation": {
+        "tissue_deformation": ("m", "mean distance that the markers moved between two frames"),
+        "tissue_displacement": ("m", "mean lateral displacement of the markers between two frames, with its sign"),
+    },
+    "base-force": {"hub_force": ("N", "lateral force at the base"), "push_force": ("N", "axial force at the base")},
+    "base-moment": {"hub_moment": ("N m", "moment at the base")},
+    "needle-shape": {"needle_shape": ("m", "deflection at stations from hub to tip")},
+    "encoder": {"depth": ("m", "inserted length")},
+}
+# The mean of tip deflection and tissue displacement, which the thesis feeds back.
+IMAGE_ERROR = "image_error"
+INPUT_UNITS: dict[str, str] = {
+    "push_force": "N",
+    "speed": "m/s",
+    "lateral_force": "N",
+    "hub_deflection": "m",
+    "hub_angle": "rad",
+    "hub_torque": "N m",
+    "tip_direction": "1",
+}
+_IMAGING = ("tip-imaging", "tissue-deformation", "needle-shape")
+# Keys of a sensor that only some kinds take.
+_SENSOR_KEYS = {
+    "pixel_size": _IMAGING,
+    "resolution": ("base-force", "base-moment", "encoder"),
+    "decay_length": ("tissue-deformation",),
+    "marker_spacing": ("tissue-deformation",),
+    "stations": ("needle-shape",),
+}
+GAIN_KEYS: dict[str, tuple[str, ...]] = {
+    "none": (),
+    "pid": ("proportional", "integral", "derivative", "filter_time"),
+    "inverse-dynamics": ("position", "velocity", "rate", "smallest_response"),
+    "incremental": ("smallest_error", "smallest_change", "largest_command", "increment"),
+    "proportional": ("proportional", "smallest_change", "largest_error"),
+}
+VARIANTS: dict[str, tuple[str, ...]] = {
+    "none": (),
+    "pid": (),
+    "inverse-dynamics": ("realizable", "fully-actuated"),
+    "incremental": ("intended",),
+    "proportional": ("intended", "as-printed"),
+}
+
+
+def _in_si(title: str, data: Any, units: Mapping[str, str], prefix: str = "") -> Any:
+    """Return plain data with the texts of some keys in SI: their units depend on another key."""
+    if not isinstance(data, Mapping):
+        return data
+    found, mistakes = dict(data), []
+    for key, unit in units.items():
+        if isinstance(found.get(key), str):
+            try:
+                found[key] = to_si(found[key], unit)
+            except ValueError as error:
+                mistakes.append(Mistake(prefix + key, f"{error} (got {shown(found[key])}; allowed a number of {unit})", found[key]))
+    raise_mistakes(title, mistakes)
+    return found
+
+
+def _output_units() -> dict[str, str]:
+    """Return every number that a controller may bring to a target, with its unit."""
+    found = {name: unit for readings in READINGS.values() for name, (unit, _) in readings.items() if name != "needle_shape"}
+    return found | {IMAGE_ERROR: "m"}
+
+
+class Target(Part):
+    """Where the tip shall arrive.
+
+    Parameters
+    ----------
+    depth
+        y [m] at which the tip's error is taken; None: the end of the run.
+    lateral
+        Wanted lateral place of the tip [m], also on the way.
+    """
+
+    depth: Annotated[float | None, Quantity("m", above=0.0, optional=True)] = None
+    lateral: Annotated[float, Quantity("m")] = 0.0
+
+
+class Sensor(Part):
+    """What a controller may know.
+
+    Parameters
+    ----------
+    kind
+        ``"tip-imaging"``, ``"tissue-deformation"``, ``"base-force"``, ``"base-moment"``, ``"needle-shape"`` or ``"encoder"``.
+    period
+        Between two readings [s].
+    delay
+        From the instant that a reading shows until it is known [s].
+    noise
+        Standard deviation of what is measured, in its SI unit; of a tissue deformation that of each marker's place.
+    pixel_size
+        Of imaging sensors [m]: places are rounded to it; 0: not at all.
+    resolution
+        Of the other sensors, in the SI unit of the reading: it is rounded to it; 0: not at all.
+    dropped_fraction
+        Share of readings that never arrive.
+    decay_length
+        Of a tissue deformation, required there [m]: an assumption, displacements fall as exp(-distance / decay_length) away
+        from the needle.
+    marker_spacing
+        Of the grid of markers of a tissue deformation [m].
+    stations
+        Of a needle shape: how many, equally spaced from hub to tip.
+    """
+
+    kind: SensorKind
+    period: Annotated[float, Quantity("s", above=0.0)] = 1 / 30
+    delay: Annotated[float, Quantity("s", at_least=0.0)] = 0.0
+    noise: Annotated[float, Quantity(at_least=0.0)] = 0.0
+    pixel_size: Annotated[float, Quantity("m", at_least=0.0)] = 0.0
+    resolution: Annotated[float, Quantity(at_least=0.0)] = 0.0
+    dropped_fraction: Annotated[float, Quantity(at_least=0.0, below=1.0)] = 0.0
+    decay_length: Annotated[float | None, Quantity("m", above=0.0, optional=True)] = None
+    marker_spacing: Annotated[float, Quantity("m", above=0.0)] = 0.01
+    stations: Annotated[int, Quantity(at_least=2, at_most=10_000, integer=True)] = 11
+
+    @model_validator(mode="before")
+    @classmethod
+    def _units(cls, data: Any) -> Any:
+        known = READINGS.get(data.get("kind", "")) if isinstance(data, Mapping) else None
+        unit = next(iter(known.values()))[0] if known else "1"
+        return _in_si("Sensor", data, {"noise": unit, "resolution": unit})
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        raise_mistakes("Sensor", self._mistakes())
+        return self
+
+    def _mistakes(self) -> Iterator[Mistake]:
+        for key, kinds in _SENSOR_KEYS.items():
+            value = getattr(self, key)
+            if self.kind not in kinds and value != type(self).model_fields[key].default:
+                limits = f"got {shown(value)}; allowed with {', '.join(kinds)}"
+                yield Mistake(key, f"has no meaning for a sensor of kind '{self.kind}' ({limits})", value)
+        if self.kind == "tissue-deformation" and self.decay_length is None:
+            yield Mistake("decay_length", "is required by kind 'tissue-deformation' (allowed above 0 m)")
+
+    @property
+    def readings(self) -> dict[str, tuple[str, str]]:
+        """Names of the readings, with unit and meaning."""
+        return READINGS[self.kind]
+
+
+class Gains(Part):
+    """Numbers of a controller, in SI units of its input and output; what is missing follows from the model (docs/control.md).
+
+    Parameters
+    ----------
+    proportional, integral, derivative
+        Of pid: input per output, per output and second, times second; ``proportional`` also of the proportional controller.
+    filter_time
+        Time constant of the filter of the derivative [s].
+    position, velocity
+        Of fully-actuated inverse dynamics: k_p [1/s^2] and k_v [1/s].
+    rate
+        Of realizable inverse dynamics: the rate at which the error of the tip decays [1/s].
+    smallest_response
+        The smallest static gain that may be divided by, as a share of the largest on the way.
+    smallest_error, smallest_change
+        Thresholds 1 and 2 of incremental control, in the unit of the output; the second also of proportional control.
+    largest_command
+        Threshold 3, in the unit of the input.
+    increment
+        b, in the unit of the input.
+    largest_error
+        Of proportional control: a larger error is taken for a fault of the image and changes nothing.
+    """
+
+    proportional: Annotated[float | None, Quantity(optional=True)] = None
+    integral: Annotated[float | None, Quantity(optional=True)] = None
+    derivative: Annotated[float | None, Quantity(optional=True)] = None
+    filter_time: Annotated[float | None, Quantity("s", at_least=0.0, optional=True)] = None
+    position: Annotated[float | None, Quantity("1/s^2", above=0.0, optional=True)] = None
+    velocity: Annotated[float | None, Quantity("1/s", above=0.0, optional=True)] = None
+    rate: Annotated[float | None, Quantity("1/s", above=0.0, optional=True)] = None
+    smallest_response: Annotated[float | None, Quantity(above=0.0, below=1.0, optional=True)] = None
+    smallest_error: Annotated[float | None, Quantity(at_least=0.0, optional=True)] = None
+    smallest_change: Annotated[float | None, Quantity(at_least=0.0, optional=True)] = None
+    largest_command: Annotated[float | None, Quantity(above=0.0, optional=True)] = None
+    increment: Annotated[float | None, Quantity(optional=True)] = None
+    largest_error: Annotated[float | None, Quantity(above=0.0, optional=True)] = None
+
+
+class Controller(Part):
+    """Who decides the command.
+
+    Parameters
+    ----------
+    kind
+        ``"none"``, ``"pid"``, ``"inverse-dynamics"``, ``"incremental"`` or ``"proportional"``.
+    variant
+        Of inverse dynamics ``"realizable"`` (default) or ``"fully-actuated"``; of the proportional controller ``"intended"``
+        (default) or ``"as-printed"``, the thesis' program with its mistakes.
+    period
+        Between two decisions [s].
+    input
+        What it commands.
+    output
+        The reading that it brings to ``target.lateral``, or ``"image_error"``, the mean of tip deflection and tissue displacement.
+    schedule
+        ``"none"``: gains as given; ``"model-gain"``: divided by the model's own static gain at the present depth.
+    gains
+        Its numbers.
+    """
+
+    kind: ControllerKind = "none"
+    variant: Literal["realizable", "fully-actuated", "intended", "as-printed"] | None = None
+    period: Annotated[float, Quantity("s", above=0.0)] = 1 / 30
+    input: InputName = "lateral_force"
+    output: str = "tip_deflection"
+    schedule: Literal["none", "model-gain"] = "none"
+    gains: Gains = Gains()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _units(cls, data: Any) -> Any:
+        """Read thresholds with a unit: that of the output or of the input."""
+        gains = data.get("gains") if isinstance(data, Mapping) else None
+        if not isinstance(gains, Mapping):
+            return data
+        given = INPUT_UNITS.get(data.get("input", "lateral_force"), "1")
+        read = _output_units().get(data.get("output", "tip_deflection"), "1")
+        units = dict.fromkeys(("smallest_error", "smallest_change", "largest_error"), read)
+        units |= dict.fromkeys(("largest_command", "increment"), given)
+        return dict(data) | {"gains": _in_si("Controller", gains, units, "gains.")}
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        raise_mistakes("Controller", self._mistakes())
+        return self
+
+    def _mistakes(self) -> Iterator[Mistake]:
+        variants = VARIANTS[self.kind]
+        if self.variant is not None and self.variant not in variants:
+            allowed = ", ".join(f"'{name}'" for name in variants) or "none"
+            message = f"does not belong to a controller of kind '{self.kind}' (got '{self.variant}'; allowed {allowed})"
+            yield Mistake("variant", message, self.variant)
+        for key in type(self.gains).model_fields:
+            value = getattr(self.gains, key)
+            if value is not None and key not in GAIN_KEYS[self.kind]:
+                found = f"got {shown(value)}; allowed {', '.join(GAIN_KEYS[self.kind]) or 'none'}"
+                yield Mistake(f"gains.{key}", f"does not belong to a controller of kind '{self.kind}' ({found})", value)
+        if self.schedule == "model-gain" and (self.kind in {"none", "inverse-dynamics"} or self.variant == "as-printed"):
+            message = "has no meaning here (got 'model-gain'; allowed 'none', or kind 'pid', 'incremental', 'proportional')"
+            yield Mistake("schedule", message, self.schedule)
+        outputs = _output_units()
+        if self.output not in outputs:
+            allowed = ", ".join(outputs)
+            yield Mistake("output", f"is no number that a sensor reads (got {shown(self.output)}; allowed {allowed})", self.output)
+
+
+class Actuator(Part):
+    """Limits of an input, in its SI unit.
+
+    Parameters
+    ----------
+    minimum, maximum
+        The command is cut to them; None: no limit.
+    rate
+        Largest change per second; None: at once.
+    """
+
+    minimum: Annotated[float | None, Quantity(optional=True)] = None
+    maximum: Annotated[float | None, Quantity(optional=True)] = None
+    rate: Annotated[float | None, Quantity(above=0.0, optional=True)] = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.minimum is not None and self.maximum is not None and self.maximum <= self.minimum:
+            limits = f"got {self.maximum:g}; allowed above minimum = {self.minimum:g}"
+            raise_mistakes("Actuator", [Mistake("maximum", f"leaves no range ({limits})", self.maximum)])
+        return self
+
+
+class Actuators(Part):
+    """Limits of the inputs; an input without any is followed exactly.
+
+    Parameters
+    ----------
+    push_force
+        N.
+    speed
+        m/s.
+    lateral_force
+        N, of the scene's lateral load.
+    hub_deflection
+        m.
+    hub_angle
+        rad.
+    hub_torque
+        N m.
+    tip_direction
+        -1 to 1, times the tip forces: the cosine of the angle by which a bevel is turned out of its plane.
+    """
+
+    push_force: Actuator | None = None
+    speed: Actuator | None = None
+    lateral_force: Actuator | None = None
+    hub_deflection: Actuator | None = None
+    hub_angle: Actuator | None = None
+    hub_torque: Actuator | None = None
+    tip_direction: Actuator | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _units(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        units = {name: {"minimum": unit, "maximum": unit, "rate": _per_second(unit)} for name, unit in INPUT_UNITS.items()}
+        return {name: _in_si("Actuators", value, units.get(name, {}), f"{name}.") for name, value in data.items()}
+
+
+def _per_second(unit: str) -> str:
+    return {"m/s": "m/s^2", "1": "1/s"}.get(unit, f"{unit}/s")
+
+
+class Scatter(Part):
+    """What differs from one repetition to the next; normally distributed.
+
+    Parameters
+    ----------
+    modulus
+        Standard deviation of the logarithm of a factor on all foundation moduli and dampings.
+    entry_angle
+        Standard deviation of the needle's angle at the entry point [rad]: the hub is turned and moved so that the straight needle
+        goes through the entry point; hub only.
+    speed
+        Standard deviation of the logarithm of a factor on the insertion's speed.
+    """
+
+    modulus: Annotated[float, Quantity(at_least=0.0, at_most=1.0)] = 0.0
+    entry_angle: Annotated[float, Quantity("rad", at_least=0.0)] = 0.0
+    speed: Annotated[float, Quantity(at_least=0.0, at_most=1.0)] = 0.0
