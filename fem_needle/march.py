@@ -14,7 +14,7 @@ from fem_needle.banded import SingularMatrixError
 from fem_needle.errors import ComputationError
 from fem_needle.initial import initial_state
 from fem_needle.ledger import StepEnd, Works, energies, force_jump_work, jump_works, row_correction, step_works
-from fem_needle.motion import DepthLaw, depth_law, landing_times, run_duration
+from fem_needle.motion import DepthLaw, Motion, depth_law, landing_times, run_duration
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample, sample_step
 from fem_needle.scene import Scene
@@ -93,27 +93,97 @@ def march(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample, N
     ComputationError
         If a step cannot be solved or gives numbers that are not finite; says at which time and depth.
     """
-    law, inertia = depth_law(plant.scene), stepper.inertia
-    state, works, last = initial_state(stepper.plant, law), Works(), None
-    landings, outputs = set(grid.landings) | {0.0}, set(grid.outputs)
-    deepest = law.depth(0.0)
+    law, landings, outputs = depth_law(plant.scene), set(grid.landings) | {0.0}, set(grid.outputs)
+    run = started(plant, stepper, law)
     for start, end, count in grid.intervals():
         times = np.linspace(start, end, count + 1)
         times[-1] = end
         for time, until in pairwise(times.tolist()):
             if time in landings:
-                state, work = pass_landing(plant, stepper, law, state, time, until)
-                works = works if time == 0.0 else works + work
-            step = _advance(plant, stepper, law, state, until, last)
+                run.land(until, counted=time > 0.0)
+            run.step(until)
             if time == 0.0:
-                yield sample_step(plant, step, works, deepest, law.depth(0.0), at_start=True, inertia=inertia)
-            works = works + row_change(last, step, landed=time in landings, inertia=inertia)
-            works = works + _works_of(plant, stepper, step, deepest)
-            state, last, deepest = step.ends[1], step, max(deepest, law.depth(until))
+                yield run.sample(at_start=True)
         if end in outputs:
-            shown = works + row_correction(step, inertia=inertia, at_start=False)
-            yield sample_step(plant, step, shown, deepest, law.depth(end), at_start=False, inertia=inertia)
+            yield run.sample()
     return RunEnd("final-depth" if ends_by_itself(plant.scene) else "duration", grid.steps)
+
+
+@dataclass
+class Marching:
+    """A position-driven run between two steps; whoever closes a loop changes stepper and law where something is commanded.
+
+    Attributes
+    ----------
+    plant
+        The model with its inertia.
+    stepper, law
+        How it steps, and the motion that it follows.
+    state, last
+        The needle now, and the step that led there (None at the start).
+    works
+        Since the start, without the correction at the end of a row of steps.
+    deepest, start_depth
+        The deepest depth so far, and that at the start [m].
+    landed
+        Whether the next step begins at a kink.
+    """
+
+    plant: Plant
+    stepper: Stepper
+    law: Motion
+    state: StepEnd
+    works: Works
+    deepest: float
+    start_depth: float
+    last: Step | None = None
+    landed: bool = False
+
+    @property
+    def time(self) -> float:
+        """Time [s]."""
+        return self.state.stage.instant.time
+
+    def land(self, until: float, *, counted: bool) -> None:
+        """Pass a kink in front of a step to a time; what it did enters the works where it is ``counted``."""
+        self.state, work = pass_landing(self.plant, self.stepper, self.law, self.state, self.time, until)
+        self.works = self.works + work if counted else self.works
+        self.landed = True
+
+    def step(self, until: float) -> None:
+        """Advance to a time."""
+        inertia = self.stepper.inertia
+        step = _advance(self.plant, self.stepper, self.law, self.state, until, self.last)
+        self.works = self.works + row_change(self.last, step, landed=self.landed, inertia=inertia)
+        self._add_works(step)
+        self.state, self.last, self.landed = step.ends[1], step, False
+        self.deepest = max(self.deepest, self.law.depth(until))
+
+    def sample(self, *, at_start: bool = False) -> Sample:
+        """Return the sample after the last step, or in front of it, where it was the first one."""
+        if self.last is None:
+            raise ComputationError("there is no sample before the first step")
+        inertia, works, depth, deepest = self.stepper.inertia, Works(), self.start_depth, self.start_depth
+        if not at_start:
+            works = self.works + row_correction(self.last, inertia=inertia, at_start=False)
+            depth, deepest = self.law.depth(self.time), self.deepest
+        return sample_step(self.plant, self.last, works, deepest, depth, at_start=at_start, inertia=inertia)
+
+    def _add_works(self, step: Step) -> None:
+        works = step_works(step, inertia=self.stepper.inertia)
+        friction = cutting = 0.0
+        scene = self.plant.scene
+        for weight, stage in zip(step.method.weights * step.length, step.stages, strict=True):
+            depth, speed = stage.instant.depth, stage.instant.speed
+            friction += weight * speed * axial.friction_force(scene, depth, speed)
+            cutting += weight * speed * axial.cutting_force(scene, depth, speed, self.deepest)
+        self.works = self.works + replace(works, friction_dissipation=friction, cutting_work=cutting)
+
+
+def started(plant: Plant, stepper: Stepper, law: DepthLaw) -> Marching:
+    """Return a run at t = 0."""
+    depth = law.depth(0.0)
+    return Marching(plant, stepper, law, initial_state(stepper.plant, law), Works(), depth, depth)
 
 
 def ends_by_itself(scene: Scene) -> bool:
@@ -122,7 +192,7 @@ def ends_by_itself(scene: Scene) -> bool:
 
 
 def pass_landing(
-    plant: Plant, stepper: Stepper, law: DepthLaw, before: StepEnd, time: float, until: float
+    plant: Plant, stepper: Stepper, law: Motion, before: StepEnd, time: float, until: float
 ) -> tuple[StepEnd, Works]:
     """Return the state just after a kink and what the kink did; a needle that leaves the tissue leaves its energy."""
     if law.depth(0.5 * (time + until)) < plant.smallest_depth:
@@ -134,7 +204,7 @@ def pass_landing(
     return after, jump_works(before, after) if stepper.inertia else force_jump_work(before, after)
 
 
-def _advance(plant: Plant, stepper: Stepper, law: DepthLaw, state: StepEnd, until: float, last: Step | None) -> Step:
+def _advance(plant: Plant, stepper: Stepper, law: Motion, state: StepEnd, until: float, last: Step | None) -> Step:
     time = state.stage.instant.time
     try:
         step = stepper.advance(law, state, until, last)
@@ -160,13 +230,3 @@ def row_change(last: Step | None, step: Step, *, landed: bool, inertia: bool) ->
         return Works()
     ended = row_correction(last, inertia=inertia, at_start=False)
     return ended + row_correction(step, inertia=inertia, at_start=True)
-
-
-def _works_of(plant: Plant, stepper: Stepper, step: Step, deepest: float) -> Works:
-    works = step_works(step, inertia=stepper.inertia)
-    friction = cutting = 0.0
-    for weight, stage in zip(step.method.weights * step.length, step.stages, strict=True):
-        depth, speed = stage.instant.depth, stage.instant.speed
-        friction += weight * speed * axial.friction_force(plant.scene, depth, speed)
-        cutting += weight * speed * axial.cutting_force(plant.scene, depth, speed, deepest)
-    return replace(works, friction_dissipation=friction, cutting_work=cutting)

@@ -46,14 +46,123 @@ def run_limits(scene: Scene) -> RunLimits:
 
 
 @dataclass
-class _Run:
-    """What changes while the loop goes on."""
+class PushMarching:
+    """A pushed run between two steps; whoever closes a loop changes the pusher where something is commanded.
 
+    Attributes
+    ----------
+    pusher, limits
+        How it steps, and where it ends.
+    state, last
+        The needle now, and the lateral step that led there (None at the start).
+    start
+        The needle at t = 0.
+    works
+        Since the start, without the correction at the end of a row of steps.
+    steps
+        How many were taken.
+    landed
+        Whether the next step begins at a kink.
+    """
+
+    pusher: Pusher
+    limits: RunLimits
     state: PushState
+    start: PushState
     works: Works
     last: Step | None = None
     steps: int = 0
     landed: bool = False
+
+    @property
+    def time(self) -> float:
+        """Time [s]."""
+        return self.state.time
+
+    def advance(self, until: float) -> str | None:
+        """Take one step, to a time or to what happens before it; returns why the run ends there, None where it goes on."""
+        step = self._guarded(until)
+        self._take(step)
+        return self._end_reason()
+
+    def sample(self, *, at_start: bool = False) -> Sample:
+        """Return the sample after the last step, or in front of it, where it was the first one."""
+        if self.last is None:
+            raise ComputationError("there is no sample before the first step")
+        pusher, inertia = self.pusher, self.pusher.stepper.inertia
+        state, shown = self.start, Works()
+        if not at_start:
+            state, shown = self.state, self.works + row_correction(self.last, inertia=inertia, at_start=False)
+        found = sample_step(
+            pusher.stepper.plant, self.last, shown, state.deepest, state.depth, at_start=at_start, inertia=inertia
+        )
+        push, speed = pusher.push(found.time), state.speed
+        friction = axial.friction_force(pusher.scene, state.depth, speed) if speed else push + state.axial_force
+        kinetic = 0.5 * pusher.mass * speed**2
+        return replace(found, speed=speed, push_force=push, friction_force=friction, axial_kinetic_energy=kinetic)
+
+    def _guarded(self, until: float) -> PushStep:
+        state, pusher = self.state, self.pusher
+        try:
+            direction, levels = pusher.direction(state), self._levels()
+            try:
+                step = pusher.step(state, until, self.last, direction)
+            except TRIAL_ERRORS:  # A jumps where the tip passes an interface, a guide comes to an end at the hub: stop there
+                event = levels.next(state.depth, direction)
+                if event is None:
+                    raise
+                return locate(pusher, state, until, direction, ("reaches", event))
+            found = first_event(pusher, state, step, direction, levels)
+            return step if found is None else locate(pusher, state, until, direction, found)
+        except (SingularMatrixError, np.linalg.LinAlgError, FloatingPointError) as error:
+            raise ComputationError(
+                f"the step at time {state.time:g} s, depth {state.depth:g} m failed: {error}; use a smaller time_step"
+            ) from error
+
+    def _levels(self) -> Limits:
+        plant, limits = self.pusher.stepper.plant, self.limits
+        levels = [*interfaces(plant.scene.tissue.layers), 0.0, limits.contact, plant.smallest_depth]
+        if limits.final_depth is not None:
+            levels.append(limits.final_depth)
+        return Limits((*levels, self.state.deepest))
+
+    def _take(self, step: PushStep) -> None:
+        """Add a step's works, and stop a needle dead at a membrane that it cannot pierce."""
+        lateral, inertia = step.lateral, self.pusher.stepper.inertia
+        if inertia and self.steps:
+            self.works = self.works + jump_works(self.state.end, lateral.ends[0])
+        self.works = self.works + row_change(self.last, lateral, landed=self.landed, inertia=inertia)
+        self.works = self.works + step.works + step_works(lateral, inertia=inertia)
+        self.landed = step.event is not None
+        self.state, self.last, self.steps = step.state, lateral, self.steps + 1
+        if step.event == "reaches":
+            self._meet_membrane()
+
+    def _meet_membrane(self) -> None:
+        state, pusher = self.state, self.pusher
+        hold = axial.hold_at(pusher.scene, state.depth, state.deepest, state.punctured)
+        if hold.membrane is None or state.speed <= 0.0:
+            return
+        if pusher.push(state.time) + state.axial_force > hold.inward:
+            self.state = replace(state, punctured=state.punctured | {hold.membrane})
+            return
+        # Arrested: momentum P is continuous, the speed is not; what the lateral motion does not take is lost.
+        stopped = StepMotion(pusher.stepper.method, state.time, 1.0, state.depth, np.zeros(4), 0)
+        after = pusher.stepper.start(stopped, state.time, state.time, state.end)
+        jump = jump_works(state.end, after) if pusher.stepper.inertia else Works()
+        lost = 0.5 * pusher.mass * state.speed**2 - jump.boundary_energy
+        self.works = self.works + jump + Works(arrest_loss=lost)
+        self.state = replace(state, end=after, speed=0.0)
+
+    def _end_reason(self) -> str | None:
+        state, limits = self.state, self.limits
+        if limits.final_depth is not None and state.depth >= limits.final_depth:
+            return "final-depth"
+        if state.depth >= limits.contact:
+            return limits.contact_reason
+        if state.depth <= 0.0 and state.speed < 0.0:
+            return "withdrawn"
+        return "stuck" if _is_stuck(self.pusher, state) else None
 
 
 def march_pushed(plant: Plant, stepper: DynamicStepper, grid: TimeGrid) -> Generator[Sample, None, RunEnd]:
@@ -64,102 +173,32 @@ def march_pushed(plant: Plant, stepper: DynamicStepper, grid: TimeGrid) -> Gener
     ComputationError
         If a step cannot be solved; says at which time and depth.
     """
-    pusher, limits = Pusher(stepper), run_limits(plant.scene)
-    run = _Run(_initial_push_state(pusher, grid), Works())
+    first, end, count = next(grid.intervals())
+    run = started_push(plant, stepper, (end - first) / count)
     for start, end, count in grid.intervals():
         length = min((end - start) / count, shortest_period(plant.scene) / STEPS_PER_PERIOD)
-        while run.state.time < end - 1e-12 * length:
-            until = min(run.state.time + length, end)
-            until = end if end - until < 1e-9 * length else until
-            step = _guarded(pusher, run, until, limits)
-            if run.steps == 0:
-                yield _sample(pusher, run, step, at_start=True)
-            _take(pusher, run, step)
-            reason = _end_reason(pusher, run, limits)
+        while run.time < end - 1e-12 * length:
+            until = min(run.time + length, end)
+            reason = run.advance(end if end - until < 1e-9 * length else until)
+            if run.steps == 1:
+                yield run.sample(at_start=True)
             if reason is not None:
-                yield _sample(pusher, run, step, at_start=False)
+                yield run.sample()
                 return RunEnd(reason, run.steps)
         if end in grid.outputs:
-            yield _sample(pusher, run, step, at_start=False)
+            yield run.sample()
     return RunEnd("duration", run.steps)
 
 
-def _initial_push_state(pusher: Pusher, grid: TimeGrid) -> PushState:
-    """Return the state at t = 0, at rest; A there comes from a trial step at rest."""
-    plant = pusher.stepper.plant
-    scene, depth = plant.scene, plant.scene.insertion.first_depth
+def started_push(plant: Plant, stepper: DynamicStepper, length: float) -> PushMarching:
+    """Return a pushed run at t = 0, at rest; A there comes from a trial step of some length [s] at rest."""
+    pusher, scene = Pusher(stepper), plant.scene
+    depth = scene.insertion.first_depth
     entered = axial.entered_layers(scene, depth)
-    state = PushState(initial_state(pusher.stepper.plant, depth_law(scene)), depth, 0.0, depth, entered, 0.0)
-    first, end, count = next(grid.intervals())
-    trial = pusher.step(state, first + (end - first) / count, None, 0).lateral
-    return replace(state, axial_force=pusher.axial_force(trial, at_start=True))
-
-
-def _guarded(pusher: Pusher, run: _Run, until: float, limits: RunLimits) -> PushStep:
-    state = run.state
-    try:
-        direction, levels = pusher.direction(state), _levels(pusher, state, limits)
-        try:
-            step = pusher.step(state, until, run.last, direction)
-        except TRIAL_ERRORS:  # A jumps where the tip passes an interface, a guide comes to an end at the hub: stop there
-            event = levels.next(state.depth, direction)
-            if event is None:
-                raise
-            return locate(pusher, state, until, direction, ("reaches", event))
-        found = first_event(pusher, state, step, direction, levels)
-        return step if found is None else locate(pusher, state, until, direction, found)
-    except (SingularMatrixError, np.linalg.LinAlgError, FloatingPointError) as error:
-        raise ComputationError(
-            f"the step at time {state.time:g} s, depth {state.depth:g} m failed: {error}; use a smaller time_step"
-        ) from error
-
-
-def _levels(pusher: Pusher, state: PushState, limits: RunLimits) -> Limits:
-    levels = [*interfaces(pusher.scene.tissue.layers), 0.0, limits.contact, pusher.stepper.plant.smallest_depth]
-    if limits.final_depth is not None:
-        levels.append(limits.final_depth)
-    return Limits((*levels, state.deepest))
-
-
-def _take(pusher: Pusher, run: _Run, step: PushStep) -> None:
-    """Add a step's works, and stop a needle dead at a membrane that it cannot pierce."""
-    lateral = step.lateral
-    run.works = run.works + jump_works(run.state.end, lateral.ends[0]) if pusher.stepper.inertia and run.steps else run.works
-    inertia = pusher.stepper.inertia
-    run.works = run.works + row_change(run.last, lateral, landed=run.landed, inertia=inertia)
-    run.works = run.works + step.works + step_works(lateral, inertia=inertia)
-    run.landed = step.event is not None
-    run.state, run.last, run.steps = step.state, lateral, run.steps + 1
-    if step.event == "reaches":
-        _meet_membrane(pusher, run)
-
-
-def _meet_membrane(pusher: Pusher, run: _Run) -> None:
-    state = run.state
-    hold = axial.hold_at(pusher.scene, state.depth, state.deepest, state.punctured)
-    if hold.membrane is None or state.speed <= 0.0:
-        return
-    if pusher.push(state.time) + state.axial_force > hold.inward:
-        run.state = replace(state, punctured=state.punctured | {hold.membrane})
-        return
-    # Arrested: momentum P is continuous, the speed is not; what the lateral motion does not take is lost.
-    stopped = StepMotion(pusher.stepper.method, state.time, 1.0, state.depth, np.zeros(4), 0)
-    after = pusher.stepper.start(stopped, state.time, state.time, state.end)
-    jump = jump_works(state.end, after) if pusher.stepper.inertia else Works()
-    lost = 0.5 * pusher.mass * state.speed**2 - jump.boundary_energy
-    run.works = run.works + jump + Works(arrest_loss=lost)
-    run.state = replace(state, end=after, speed=0.0)
-
-
-def _end_reason(pusher: Pusher, run: _Run, limits: RunLimits) -> str | None:
-    state = run.state
-    if limits.final_depth is not None and state.depth >= limits.final_depth:
-        return "final-depth"
-    if state.depth >= limits.contact:
-        return limits.contact_reason
-    if state.depth <= 0.0 and state.speed < 0.0:
-        return "withdrawn"
-    return "stuck" if _is_stuck(pusher, state) else None
+    state = PushState(initial_state(stepper.plant, depth_law(scene)), depth, 0.0, depth, entered, 0.0)
+    trial = pusher.step(state, length, None, 0).lateral
+    state = replace(state, axial_force=pusher.axial_force(trial, at_start=True))
+    return PushMarching(pusher, run_limits(scene), state, state, Works())
 
 
 def _is_stuck(pusher: Pusher, state: PushState) -> bool:
@@ -170,21 +209,3 @@ def _is_stuck(pusher: Pusher, state: PushState) -> bool:
     hold = axial.hold_at(scene, state.depth, state.deepest, state.punctured)
     driving, slack = scene.insertion.push_force, STUCK_MARGIN * abs(state.axial_force)
     return driving + slack < hold.inward and driving - slack > -hold.outward
-
-
-def _sample(pusher: Pusher, run: _Run, step: PushStep, *, at_start: bool) -> Sample:
-    state, scene, inertia = run.state, pusher.scene, pusher.stepper.inertia
-    shown = run.works if at_start else run.works + row_correction(step.lateral, inertia=inertia, at_start=False)
-    sample = sample_step(
-        pusher.stepper.plant,
-        step.lateral,
-        shown,
-        state.deepest,
-        state.depth,
-        at_start=at_start,
-        inertia=inertia,
-    )
-    push = pusher.push(sample.time)
-    friction = axial.friction_force(scene, state.depth, state.speed) if state.speed else push + state.axial_force
-    kinetic = 0.5 * pusher.mass * state.speed**2
-    return replace(sample, speed=state.speed, push_force=push, friction_force=friction, axial_kinetic_energy=kinetic)
