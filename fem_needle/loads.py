@@ -53,6 +53,7 @@ def is_steady(scene: Scene) -> bool:
     support = scene.support
     values = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
     values += [load.force for load in scene.loads if load.force is not None]
+    values += [load.direction for load in scene.loads if isinstance(load, TipLoad)]
     return all(isinstance(value, float) for value in values)
 
 
@@ -79,16 +80,18 @@ def load_cases(scene: Scene, depths: Array, times: Array) -> LoadCase:
 
 
 def _tip_forces(scene: Scene, depths: Array, times: Array) -> tuple[Array, Array]:
-    """Sum the tip loads; the bevel law is F = a k(y) m(t) with the modulus at the tip."""
+    """Sum the tip loads, each times its direction; the bevel law is F = a k(y) m(t) with the modulus at the tip."""
     total, rate = np.zeros_like(times), np.zeros_like(times)
     factor = as_function(scene.tissue.stiffness_factor)
     for load in scene.loads:
         if not isinstance(load, TipLoad):
             continue
         if load.bevel_coefficient is None:
-            force = as_function(0.0 if load.force is None else load.force)
-            total, rate = total + force.value(times), rate + force.derivative(times)
+            force, scale = as_function(0.0 if load.force is None else load.force), np.ones_like(times)
         else:
-            scale = load.bevel_coefficient * tip_values(scene.tissue.layers, depths, lambda layer: layer.foundation_modulus)
-            total, rate = total + scale * factor.value(times), rate + scale * factor.derivative(times)
+            moduli = tip_values(scene.tissue.layers, depths, lambda layer: layer.foundation_modulus)
+            force, scale = factor, load.bevel_coefficient * moduli
+        turned = as_function(load.direction)
+        total = total + scale * force.value(times) * turned.value(times)
+        rate = rate + scale * (force.derivative(times) * turned.value(times) + force.value(times) * turned.derivative(times))
     return total, rate

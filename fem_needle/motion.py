@@ -179,6 +179,7 @@ def shortest_period(scene: Scene) -> float:
     sources = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
     sources += [value for value in (insertion.speed, insertion.depth, insertion.push_force) if value is not None]
     sources += [load.force for load in scene.loads if load.force is not None]
+    sources += [load.direction for load in scene.loads if isinstance(load, TipLoad)]
     rates = [abs(source.frequency) for source in sources if isinstance(source, Sinusoid)]
     return 1.0 / max(rates) if rates and max(rates) > 0 else float("inf")
 
@@ -189,7 +190,8 @@ def landing_times(scene: Scene, law: DepthLaw, duration: float, smallest_depth: 
     sources = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
     sources += [] if scene.insertion.push_force is None else [scene.insertion.push_force]
     sources += [load.force for load in scene.loads if isinstance(load, LateralLoad)]
-    sources += [load.force for load in scene.loads if isinstance(load, TipLoad) and load.force is not None]
+    tips = [load for load in scene.loads if isinstance(load, TipLoad)]
+    sources += [load.direction for load in tips] + [load.force for load in tips if load.force is not None]
     times = set(law.kinks(duration))
     for source in sources:
         times |= {time for time in as_function(source).breakpoints if 0 < time < duration}

@@ -99,7 +99,7 @@ def _has_vibrations(scene: Scene) -> bool:
 def _has_simple_loads(scene: Scene) -> bool:
     varying = 0
     for load in scene.loads:
-        if not isinstance(load, TipLoad) or isinstance(load.force, Table):
+        if not isinstance(load, TipLoad) or isinstance(load.force, Table) or load.direction != 1.0:
             return False
         varying += isinstance(load.force, Sinusoid)
     return varying <= 1

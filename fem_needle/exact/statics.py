@@ -208,9 +208,10 @@ def tip_force(scene: Scene, depth: float, time: float) -> float:
 
 
 def _tip_load_force(load: TipLoad, scene: Scene, depth: float, time: float) -> float:
+    direction = as_function(load.direction).value(time)
     if load.force is not None:
-        return as_function(load.force).value(time)
-    return (load.bevel_coefficient or 0.0) * foundation_modulus(scene, depth, time)
+        return as_function(load.force).value(time) * direction
+    return (load.bevel_coefficient or 0.0) * foundation_modulus(scene, depth, time) * direction
 
 
 def _lateral_forces(scene: Scene, time: float) -> list[tuple[float, float]]:

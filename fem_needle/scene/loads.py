@@ -21,11 +21,14 @@ class TipLoad(Part):
     bevel_coefficient
         a [m^2]: the force is a times the foundation modulus at the tip (the
         deeper layer at an interface, 0 outside the tissue).
+    direction
+        -1 to 1, times the force, may vary in time: the cosine of the angle by which a bevel is turned out of the plane.
     """
 
     kind: Literal["tip"] = "tip"
     force: Annotated[TimeValue | None, TimeQuantity("N", optional=True)] = None
     bevel_coefficient: Annotated[float | None, Quantity("m^2", optional=True)] = None
+    direction: Annotated[TimeValue, TimeQuantity(at_least=-1.0, at_most=1.0)] = 1.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -30,6 +30,15 @@ def test_bevel_force_of_the_layer_at_the_tip(depth, modulus):
     assert case.force_rates == pytest.approx([2e-6 * modulus * WAVE.derivative(0.3)])
 
 
+def test_a_turned_bevel_pushes_with_the_cosine():
+    """F = a k d(t) of the bevel and F(t) d(t) of a given force; the rates by the product rule."""
+    loads = [TipLoad(bevel_coefficient=2e-6, direction=RAMP), TipLoad(force=WAVE, direction=-0.5)]
+    case = load_case(scene_of("entry", held(0.1), LAYERS, loads), 0.02, 0.5)
+    assert case.forces == pytest.approx([2e-6 * 5e3 * 0.25 - 0.5 * WAVE.value(0.5)])
+    assert case.force_rates == pytest.approx([2e-6 * 5e3 * 0.5 - 0.5 * WAVE.derivative(0.5)])
+    assert not is_steady(scene_of("entry", held(0.1), loads=[TipLoad(force=1.0, direction=RAMP)]))
+
+
 def test_motion_of_the_hub():
     support = {"hub_deflection": WAVE, "hub_angle": RAMP}
     case = load_case(scene_of("hub", held(0.1), support=support), 0.1, 0.7)
