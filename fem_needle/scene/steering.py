@@ -76,7 +76,8 @@ def _in_si(title: str, data: Any, units: Mapping[str, str], prefix: str = "") ->
             try:
                 found[key] = to_si(found[key], unit)
             except ValueError as error:
-                mistakes.append(Mistake(prefix + key, f"{error} (got {shown(found[key])}; allowed a number of {unit})", found[key]))
+                limits = f"got {shown(found[key])}; allowed a number of {unit}"
+                mistakes.append(Mistake(prefix + key, f"{error} ({limits})", found[key]))
     raise_mistakes(title, mistakes)
     return found
 
@@ -223,7 +224,8 @@ class Controller(Part):
     input
         What it commands.
     output
-        The reading that it brings to ``target.lateral``, or ``"image_error"``, the mean of tip deflection and tissue displacement.
+        The reading that it brings to ``target.lateral``, or ``"image_error"``, the mean of tip deflection and tissue
+        displacement.
     schedule
         ``"none"``: gains as given; ``"model-gain"``: divided by the model's own static gain at the present depth.
     gains
@@ -272,8 +274,8 @@ class Controller(Part):
             yield Mistake("schedule", message, self.schedule)
         outputs = _output_units()
         if self.output not in outputs:
-            allowed = ", ".join(outputs)
-            yield Mistake("output", f"is no number that a sensor reads (got {shown(self.output)}; allowed {allowed})", self.output)
+            limits = f"got {shown(self.output)}; allowed {', '.join(outputs)}"
+            yield Mistake("output", f"is no number that a sensor reads ({limits})", self.output)
 
 
 class Actuator(Part):
