@@ -13,13 +13,17 @@ from fem_needle.scene.time_quantity import extremes
 from fem_needle.scene.units import display_unit, parse_unit
 
 Row = tuple[Text, Text, Text]
+# Tables of a closed loop, shown where a scene has one.
+_OF_A_LOOP = ("target", "controller", "actuators", "scatter")
 
 
 def scene_rows(scene: Scene) -> Iterator[Row]:
     """Yield key, value in SI and value in mm, N, s for every value of a scene."""
+    fields = type(scene).model_fields
+    hidden = {name for name in _OF_A_LOOP if getattr(scene, name) == fields[name].default} | {"title"}  # the table's own title
     for path, value, quantity in entries(scene):
-        if path == "title":
-            continue  # the table's own title
+        if path.partition(".")[0] in hidden:
+            continue
         unit = "1" if quantity is None else quantity.unit
         # Plain text: a title or a name may hold what looks like markup.
         yield Text(path), Text(_written(value, unit)), Text(_converted(value, unit))

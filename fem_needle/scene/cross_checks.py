@@ -9,7 +9,7 @@ from fem_needle.mesh_file import length_mistake
 from fem_needle.scene.loads import LateralLoad, TipLoad
 from fem_needle.scene.part import Mistake
 from fem_needle.scene.settings import FIXED_FRAME_VARIANTS
-from fem_needle.scene.steering import IMAGE_ERROR
+from fem_needle.scene.signals import IMAGE_ERROR
 
 if TYPE_CHECKING:
     from fem_needle.scene.scene import Scene

@@ -16,6 +16,10 @@ class Part(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
 
+    def own_units(self) -> dict[str, str | None]:
+        """Return dotted keys whose unit depends on another key, with that unit; None: the key has no meaning here."""
+        return {}
+
 
 class Mistake(NamedTuple):
     """One mistake found between fields.

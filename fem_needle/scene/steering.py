@@ -9,38 +9,12 @@ from pydantic import model_validator
 
 from fem_needle.scene.part import Mistake, Part, raise_mistakes, shown
 from fem_needle.scene.quantity import Quantity
+from fem_needle.scene.signals import INPUT_UNITS, READINGS, InputName, SensorKind, gain_units, limit_units, output_units
 from fem_needle.scene.units import to_si
 
-SensorKind = Literal["tip-imaging", "tissue-deformation", "base-force", "base-moment", "needle-shape", "encoder"]
 ControllerKind = Literal["none", "pid", "inverse-dynamics", "incremental", "proportional"]
-InputName = Literal["push_force", "speed", "lateral_force", "hub_deflection", "hub_angle", "hub_torque", "tip_direction"]
 
-# Name of each reading of a kind of sensor, with unit and meaning.
-READINGS: dict[str, dict[str, tuple[str, str]]] = {
-    "tip-imaging": {
-        "tip_deflection": ("m", "lateral place of the tip in the image"),
-        "needle_angle": ("rad", "angle of the line from the entry point to the tip in the image"),
-    },
-    "tissue-deformation": {
-        "tissue_deformation": ("m", "mean distance that the markers moved between two frames"),
-        "tissue_displacement": ("m", "mean lateral displacement of the markers between two frames, with its sign"),
-    },
-    "base-force": {"hub_force": ("N", "lateral force at the base"), "push_force": ("N", "axial force at the base")},
-    "base-moment": {"hub_moment": ("N m", "moment at the base")},
-    "needle-shape": {"needle_shape": ("m", "deflection at stations from hub to tip")},
-    "encoder": {"depth": ("m", "inserted length")},
-}
-# The mean of tip deflection and tissue displacement, which the thesis feeds back.
-IMAGE_ERROR = "image_error"
-INPUT_UNITS: dict[str, str] = {
-    "push_force": "N",
-    "speed": "m/s",
-    "lateral_force": "N",
-    "hub_deflection": "m",
-    "hub_angle": "rad",
-    "hub_torque": "N m",
-    "tip_direction": "1",
-}
+SIGNAL_PREFIXES = ("command_", "measurement_")
 _IMAGING = ("tip-imaging", "tissue-deformation", "needle-shape")
 # Keys of a sensor that only some kinds take.
 _SENSOR_KEYS = {
@@ -66,6 +40,16 @@ VARIANTS: dict[str, tuple[str, ...]] = {
 }
 
 
+def signal_description(name: str) -> tuple[str, str]:
+    """Return unit and meaning of a command or measurement, ``command_<input>`` or ``measurement_<reading>``."""
+    kind, _, what = name.partition("_")
+    if kind == "command":
+        return INPUT_UNITS[what], f"{what.replace('_', ' ')} as the actuator gives it"
+    readings = {reading: about for found in READINGS.values() for reading, about in found.items()}
+    unit, meaning = readings[what]
+    return unit, f"latest reading: {meaning}"
+
+
 def _in_si(title: str, data: Any, units: Mapping[str, str], prefix: str = "") -> Any:
     """Return plain data with the texts of some keys in SI: their units depend on another key."""
     if not isinstance(data, Mapping):
@@ -82,10 +66,10 @@ def _in_si(title: str, data: Any, units: Mapping[str, str], prefix: str = "") ->
     return found
 
 
-def _output_units() -> dict[str, str]:
-    """Return every number that a controller may bring to a target, with its unit."""
-    found = {name: unit for readings in READINGS.values() for name, (unit, _) in readings.items() if name != "needle_shape"}
-    return found | {IMAGE_ERROR: "m"}
+def _reading_unit(kind: Any) -> str:
+    """Return the unit of what a kind of sensor measures; "1" of an unknown kind."""
+    readings = READINGS.get(kind, {}) if isinstance(kind, str) else {}
+    return next((unit for unit, _ in readings.values()), "1")
 
 
 class Target(Part):
@@ -145,9 +129,13 @@ class Sensor(Part):
     @model_validator(mode="before")
     @classmethod
     def _units(cls, data: Any) -> Any:
-        known = READINGS.get(data.get("kind", "")) if isinstance(data, Mapping) else None
-        unit = next(iter(known.values()))[0] if known else "1"
-        return _in_si("Sensor", data, {"noise": unit, "resolution": unit})
+        kind = data.get("kind") if isinstance(data, Mapping) else None
+        return _in_si("Sensor", data, dict.fromkeys(("noise", "resolution"), _reading_unit(kind)))
+
+    def own_units(self) -> dict[str, str | None]:
+        """Return the unit of what is measured; other kinds' keys have no meaning."""
+        units: dict[str, str | None] = dict.fromkeys(("noise", "resolution"), _reading_unit(self.kind))
+        return units | {key: None for key, kinds in _SENSOR_KEYS.items() if self.kind not in kinds}
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -243,15 +231,18 @@ class Controller(Part):
     @model_validator(mode="before")
     @classmethod
     def _units(cls, data: Any) -> Any:
-        """Read thresholds with a unit: that of the output or of the input."""
+        """Read gains with a unit, which follows from those of input and output."""
         gains = data.get("gains") if isinstance(data, Mapping) else None
         if not isinstance(gains, Mapping):
             return data
-        given = INPUT_UNITS.get(data.get("input", "lateral_force"), "1")
-        read = _output_units().get(data.get("output", "tip_deflection"), "1")
-        units = dict.fromkeys(("smallest_error", "smallest_change", "largest_error"), read)
-        units |= dict.fromkeys(("largest_command", "increment"), given)
+        output = "pixels" if data.get("variant") == "as-printed" else data.get("output", "tip_deflection")
+        units = gain_units(str(data.get("input", "lateral_force")), str(output))
         return dict(data) | {"gains": _in_si("Controller", gains, units, "gains.")}
+
+    def own_units(self) -> dict[str, str | None]:
+        """Return the units of those gains that depend on input and output."""
+        output = "pixels" if self.variant == "as-printed" else self.output
+        return {f"gains.{key}": unit for key, unit in gain_units(self.input, output).items()}
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -272,7 +263,7 @@ class Controller(Part):
         if self.schedule == "model-gain" and (self.kind in {"none", "inverse-dynamics"} or self.variant == "as-printed"):
             message = "has no meaning here (got 'model-gain'; allowed 'none', or kind 'pid', 'incremental', 'proportional')"
             yield Mistake("schedule", message, self.schedule)
-        outputs = _output_units()
+        outputs = output_units()
         if self.output not in outputs:
             limits = f"got {shown(self.output)}; allowed {', '.join(outputs)}"
             yield Mistake("output", f"is no number that a sensor reads ({limits})", self.output)
@@ -335,12 +326,11 @@ class Actuators(Part):
     def _units(cls, data: Any) -> Any:
         if not isinstance(data, Mapping):
             return data
-        units = {name: {"minimum": unit, "maximum": unit, "rate": _per_second(unit)} for name, unit in INPUT_UNITS.items()}
-        return {name: _in_si("Actuators", value, units.get(name, {}), f"{name}.") for name, value in data.items()}
+        return {name: _in_si("Actuators", value, limit_units(str(name)), f"{name}.") for name, value in data.items()}
 
-
-def _per_second(unit: str) -> str:
-    return {"m/s": "m/s^2", "1": "1/s"}.get(unit, f"{unit}/s")
+    def own_units(self) -> dict[str, str | None]:
+        """Return the units of all limits."""
+        return {f"{name}.{key}": unit for name in INPUT_UNITS for key, unit in limit_units(name).items()}
 
 
 class Scatter(Part):

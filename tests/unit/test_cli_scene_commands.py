@@ -68,6 +68,28 @@ def test_check_shows_si_and_millimeters(run):
     assert "not the Young's modulus" in out
 
 
+def test_check_shows_a_closed_loop_in_the_units_of_its_input_and_output(run, tmp_path):
+    path = tmp_path / "loop.toml"
+    lines = shipped.template_text().splitlines()
+    first, last = lines.index("# [target]"), lines.index("[run]")
+    path.write_text("\n".join([*lines[:first], *(line.removeprefix("# ") for line in lines[first:last]), *lines[last:]]))
+    status, out, err = run("check", str(path))
+    assert (status, err) == (0, "")
+    rows = {line.split()[0]: " ".join(line.split()[1:]) for line in out.splitlines() if line.strip()}
+    assert rows["target.depth"] == "0.12 m 120 mm"
+    assert rows["sensors.0.noise"] == "0.0001 m 0.1 mm"
+    assert rows["controller.gains.proportional"] == "20 N/m 0.02 N/mm"
+    assert rows["controller.gains.integral"] == "20 N/m s 0.02 N/mm s"
+    assert rows["actuators.lateral_force.rate"] == "10 N/s"
+    assert {"sensors.0.resolution", "sensors.0.stations", "scatter.modulus"} & set(rows) == set()
+
+
+def test_check_shows_nothing_of_a_loop_that_a_scene_has_not(run):
+    out = run("check", "brachytherapy")[1]
+    assert "friction.coulomb" in out
+    assert [word for word in ("target", "controller", "actuators", "scatter") if f"{word}." in out] == []
+
+
 @pytest.mark.parametrize(("options", "status"), [((), 0), (("--strict",), 2)])
 def test_check_warns_and_is_strict_if_asked(run, tmp_path, options, status):
     path = tmp_path / "mine.toml"
