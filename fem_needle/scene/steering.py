@@ -9,8 +9,32 @@ from pydantic import model_validator
 
 from fem_needle.scene.part import Mistake, Part, raise_mistakes, shown
 from fem_needle.scene.quantity import Quantity
-from fem_needle.scene.signals import INPUT_UNITS, READINGS, InputName, SensorKind, gain_units, limit_units, output_units
+from fem_needle.scene.signals import (
+    IMAGE_ERROR,
+    INPUT_UNITS,
+    READINGS,
+    InputName,
+    SensorKind,
+    gain_units,
+    limit_units,
+    output_units,
+)
 from fem_needle.scene.units import to_si
+
+__all__ = [
+    "GAIN_KEYS",
+    "IMAGE_ERROR",
+    "INPUT_UNITS",
+    "READINGS",
+    "VARIANTS",
+    "Actuator",
+    "Actuators",
+    "Controller",
+    "Gains",
+    "Scatter",
+    "Sensor",
+    "Target",
+]
 
 ControllerKind = Literal["none", "pid", "inverse-dynamics", "incremental", "proportional"]
 

@@ -49,6 +49,7 @@ _NAMES: dict[Dimension, str] = {
     (0, 0, 1, 0): "time",
     (0, 0, -1, 0): "frequency",
     (0, 1, -1, 0): "speed",
+    (0, 1, -2, 0): "acceleration",
     (1, 1, -2, 0): "force",
     (1, 0, -2, 0): "force per length",
     (1, -1, -2, 0): "pressure or force per area",
@@ -56,7 +57,10 @@ _NAMES: dict[Dimension, str] = {
     (1, 2, -2, 0): "moment or energy",
     (1, 0, -1, 0): "force per speed",
     (1, -1, -1, 0): "force per speed and length",
+    (1, 1, -3, 0): "force per time",
+    (1, 2, -3, 0): "moment per time or power",
     (0, 0, 0, 1): "angle",
+    (0, 0, -1, 1): "angle per time",
 }
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)

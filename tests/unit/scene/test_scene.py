@@ -305,6 +305,8 @@ PATHS = st.sampled_from(
         ("insertion", "kind"), ("insertion", "speed"), ("insertion", "depth"), ("insertion", "initial_depth"), ("loads",),
         ("initial", ), ("initial", "shape"), ("run", "duration"), ("model",), ("numerics", "elements"), ("title",),
         ("format_version",), ("friction",), ("unknown",), ("numerics", "unknown"),
+        ("sensors",), ("controller",), ("controller", "kind"), ("controller", "gains"), ("controller", "input"), ("target",),
+        ("actuators",), ("actuators", "speed"), ("scatter",),
     ]
 )  # fmt: skip
 KEYS = st.sampled_from(["time", "value", "unit", "mean", "amplitude", "frequency", "phase", "file", "column", "kind", "x"])
