@@ -82,6 +82,7 @@ RANKS = {
     "analysis": 16,
     "convergence": 17,
     "comparison": 17,
+    "control": 17,
     "benchmark": 18,
     "run_folder": 14,
     "batch": 16,

@@ -1,0 +1,79 @@
+"""What goes into a controller and out of it: the output read, the input's own value, the actuator's limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+
+from fem_needle.control.controller import Measurement
+from fem_needle.scene import LateralLoad, Scene, TipLoad, as_function
+from fem_needle.scene.signals import IMAGE_ERROR, InputName
+
+Reader = Callable[[Measurement], float | None]
+
+
+def output_reader(output: str) -> Reader:
+    """Return the function that finds the output in a measurement, None while a reading is missing.
+
+    Parameters
+    ----------
+    output
+        Name of a reading, or ``"image_error"``: (tip deflection + tissue displacement) / 2 [m].
+    """
+    if output != IMAGE_ERROR:
+        return lambda measurement: measurement.get(output)
+
+    def image_error(measurement: Measurement) -> float | None:
+        tip, tissue = measurement.get("tip_deflection"), measurement.get("tissue_displacement")
+        return None if tip is None or tissue is None else 0.5 * (tip + tissue)
+
+    return image_error
+
+
+def own_value(scene: Scene, name: InputName) -> float:
+    """Return what the scene itself gives an input that it has, at t = 0, in SI."""
+    if name == "tip_direction":
+        value = next(load.direction for load in scene.loads if isinstance(load, TipLoad))
+    elif name == "lateral_force":
+        value = next(load.force for load in scene.loads if isinstance(load, LateralLoad))
+    else:
+        value = getattr(scene.insertion if name in {"push_force", "speed"} else scene.support, name)
+    return as_function(value).value(0.0)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an actuator can do, in SI.
+
+    Attributes
+    ----------
+    minimum, maximum
+        Of the command.
+    step
+        Largest change in one period: rate times period.
+    """
+
+    minimum: float = -inf
+    maximum: float = inf
+    step: float = inf
+
+    def cut(self, wanted: float, last: float) -> float:
+        """Return the allowed command nearest to the wanted one: in the range, then at most a step from the last."""
+        inside = min(max(wanted, self.minimum), self.maximum)
+        return min(max(inside, last - self.step), last + self.step)
+
+
+FREE = Limits()
+
+
+def actuator_limits(scene: Scene) -> Limits:
+    """Return the limits of the controller's input; a direction is a cosine and never leaves -1 to 1."""
+    name = scene.controller.input
+    least, most = (-1.0, 1.0) if name == "tip_direction" else (-inf, inf)
+    actuator = getattr(scene.actuators, name)
+    if actuator is None:
+        return Limits(least, most)
+    minimum = least if actuator.minimum is None else max(least, actuator.minimum)
+    maximum = most if actuator.maximum is None else min(most, actuator.maximum)
+    return Limits(minimum, maximum, inf if actuator.rate is None else actuator.rate * scene.controller.period)
