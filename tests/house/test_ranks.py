@@ -69,6 +69,7 @@ RANKS = {
     "trajectory": 11,
     "choices": 12,
     "detuning": 13,
+    "sensing": 12,
     "expectation": 1,
     "finite_element_model": 13,
     "series_file": 12,
