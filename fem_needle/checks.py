@@ -12,6 +12,9 @@ from fem_needle.scene.listing import entries
 from fem_needle.scene.time_functions import Sinusoid, Table
 from fem_needle.scene.time_quantity import TimeValue, extremes
 
+OLD_READINGS = 0.1  # a controller's period by that of the sensor it reads: below, it decides on old readings
+LONG_DELAY = 5.0  # a sensor's delay by the controller's period: above, several commands are on the way unseen
+
 NOT_YOUNGS_MODULUS = (
     "foundation_modulus is lateral force per length and deflection [N/m^2], "
     "not the Young's modulus of the tissue"
@@ -20,7 +23,7 @@ NOT_YOUNGS_MODULUS = (
 
 def suspicious(scene: Scene) -> tuple[str, ...]:
     """Return a message for each suspicious value; none for an ordinary scene."""
-    checks = (_units, _needle, _layers, _push, _tip_force, _times, _model)
+    checks = (_units, _needle, _layers, _push, _tip_force, _times, _model, _sensors, _feedback)
     return tuple(message for check in checks for message in check(scene))
 
 
@@ -160,3 +163,29 @@ def _times(scene: Scene) -> Iterator[str]:
             yield f"numerics.{name} = {step:g} s > {duration:g} s, the duration of the run"
         elif isinstance(step, float) and step < 1e-9 * duration:
             yield f"numerics.{name} = {step:g} s < 1e-9 times {duration:g} s, the duration: a very long run"
+
+
+def _sensors(scene: Scene) -> Iterator[str]:
+    for index, sensor in enumerate(scene.sensors):
+        if 0.0 < scene.duration < sensor.period:
+            yield f"sensors.{index}.period = {sensor.period:g} s > {scene.duration:g} s, the duration of the run: it reads once"
+        if sensor.pixel_size > 1e-2:
+            yield f"sensors.{index}.pixel_size = {sensor.pixel_size:g} m > 1e-2 m: looks like mm"
+
+
+def _feedback(scene: Scene) -> Iterator[str]:
+    """Compare the controller's period with those of the sensors that it reads, and with their delays."""
+    period = scene.controller.period
+    for index, sensor in enumerate(scene.sensors):
+        if not scene.controller.feedback & sensor.readings.keys():
+            continue
+        if period < OLD_READINGS * sensor.period:
+            yield (
+                f"controller.period = {period:g} s < {OLD_READINGS:g} times sensors.{index}.period = {sensor.period:g} s: "
+                "it decides on old readings"
+            )
+        if sensor.delay > LONG_DELAY * period:
+            yield (
+                f"sensors.{index}.delay = {sensor.delay:g} s > {LONG_DELAY:g} times controller.period = {period:g} s: "
+                "the loop swings unless its gains are small"
+            )

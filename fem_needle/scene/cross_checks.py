@@ -9,7 +9,6 @@ from fem_needle.mesh_file import length_mistake
 from fem_needle.scene.loads import LateralLoad, TipLoad
 from fem_needle.scene.part import Mistake
 from fem_needle.scene.settings import FIXED_FRAME_VARIANTS
-from fem_needle.scene.signals import IMAGE_ERROR
 
 if TYPE_CHECKING:
     from fem_needle.scene.scene import Scene
@@ -157,7 +156,7 @@ def _steering_mistakes(scene: Scene) -> Iterator[Mistake]:
         yield Mistake("target.depth", f"deeper than the needle is long ({limits})", scene.target.depth)
     if scene.scatter.entry_angle and scene.support.kind != "hub":
         yield Mistake("scatter.entry_angle", "needs the support 'hub' (allowed 0)", scene.scatter.entry_angle)
-    if scene.controller.kind != "none" and scene.controller.variant != "fully-actuated":
+    if scene.controller.feedback:
         yield from _controller_mistakes(scene, names)
 
 
@@ -166,9 +165,7 @@ def _controller_mistakes(scene: Scene, names: list[str]) -> Iterator[Mistake]:
     obstacle = input_obstacle(scene, controller.input)
     if obstacle:
         yield Mistake("controller.input", f"'{controller.input}' {obstacle}", controller.input)
-    needed = {"tip_deflection", "tissue_displacement"} if controller.output == IMAGE_ERROR else {controller.output}
-    if controller.variant == "as-printed":
-        needed = {"needle_angle", "tissue_deformation"}
+    needed = set(controller.feedback)
     if controller.kind == "inverse-dynamics" or controller.schedule == "model-gain":
         needed |= {"depth"}
     if needed - set(names):

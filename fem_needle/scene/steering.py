@@ -273,6 +273,15 @@ class Controller(Part):
         raise_mistakes("Controller", self._mistakes())
         return self
 
+    @property
+    def feedback(self) -> frozenset[str]:
+        """Names of the readings that make the error; none of a controller that reads nothing."""
+        if self.kind == "none" or self.variant == "fully-actuated":
+            return frozenset()
+        if self.variant == "as-printed":
+            return frozenset({"needle_angle", "tissue_deformation"})
+        return frozenset({"tip_deflection", "tissue_displacement"} if self.output == IMAGE_ERROR else {self.output})
+
     def _mistakes(self) -> Iterator[Mistake]:
         variants = VARIANTS[self.kind]
         if self.variant is not None and self.variant not in variants:

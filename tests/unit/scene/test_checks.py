@@ -3,7 +3,7 @@ import pytest
 from fem_needle import shipped
 from fem_needle.checks import suspicious, warn_if_suspicious
 from fem_needle.errors import SuspiciousValueWarning
-from fem_needle.scene import Friction, Layer, Run, Support, Tissue
+from fem_needle.scene import Controller, Friction, LateralLoad, Layer, Run, Sensor, Support, Tissue
 from fem_needle.scene_file import load_scene, parse_scene
 from tests.unit.scene.examples import hub_scene
 
@@ -69,3 +69,34 @@ def test_warnings_are_issued():
     scene = hub_scene().with_value("support.hub_angle", 2.0)
     with pytest.warns(SuspiciousValueWarning, match="looks like degrees"):
         assert len(warn_if_suspicious(scene)) == 1
+
+
+def steered(every, **sensor):
+    """A loop of 14 s over a tip image and an encoder, with a lateral force before the guide."""
+    loads = [LateralLoad(position=-0.035, force=0.0)]
+    sensors = [Sensor(kind="encoder", period=0.001), Sensor(kind="tip-imaging", **sensor)]
+    return hub_scene(loads=loads, sensors=sensors, controller=Controller(kind="pid", period=every))
+
+
+@pytest.mark.parametrize(
+    ("every", "sensor", "message"),
+    [
+        (2.0, {"period": 14.1}, "sensors.1.period = 14.1 s > 14 s, the duration of the run: it reads once"),
+        (0.1, {"pixel_size": 0.011}, "sensors.1.pixel_size = 0.011 m > 1e-2 m: looks like mm"),
+        (0.1, {"period": 1.01}, "controller.period = 0.1 s < 0.1 times sensors.1.period = 1.01 s: it decides on old readings"),
+        (0.1, {"delay": 0.51}, "sensors.1.delay = 0.51 s > 5 times controller.period = 0.1 s: the loop swings unless"),
+    ],
+)
+def test_a_suspicious_loop_names_its_inequality(every, sensor, message):
+    (line,) = suspicious(steered(every, **sensor))
+    assert line.startswith(message)
+
+
+def test_an_ordinary_loop_is_not_suspicious():
+    """Each value at the limit of a check, or beyond it at a sensor that the controller does not read."""
+    assert suspicious(steered(0.1, period=1.0, delay=0.5, pixel_size=0.01)) == ()
+    assert suspicious(steered(1.41, period=14.0)) == ()
+    free = steered(0.1).with_values({"sensors.0.delay": 10.0, "sensors.0.period": 5.0})
+    assert suspicious(free) == ()
+    assert suspicious(free.with_value("controller.output", "depth")) != ()
+    assert suspicious(free.with_values({"controller.output": "depth", "controller.kind": "none"})) == ()
