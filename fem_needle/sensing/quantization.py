@@ -16,7 +16,7 @@ def rounded(value: float, step: float) -> float:
     Halves go up, to the larger number, also below zero: a pixel that begins half a step below its middle belongs to it, one
     that ends half a step above does not. A step of 0 changes nothing.
     """
-    return floor(value / step + 0.5) * step if step else value
+    return floor(value / step + 0.5) * step if step else float(value)
 
 
 def rounded_array(values: Array, step: float) -> Array:

@@ -84,6 +84,15 @@ def test_every_kind_reads_the_names_that_the_scene_says(kind):
     assert read_once(kind, Known(depth=0.1), **keys).keys() == READINGS[kind].keys()
 
 
+@pytest.mark.parametrize("kind", ["tip-imaging", "base-force", "base-moment", "encoder"])
+def test_readings_are_plain_floats(kind):
+    """A controller of 1 kHz has no time for numbers of numpy."""
+    one = np.float64(1.0)
+    truth = Known(depth=one, tip_deflection=one, hub_force=one, hub_moment=one, push_force=one)
+    for keys in ({}, {"noise": 0.1}, {"pixel_size" if kind == "tip-imaging" else "resolution": 0.1}):
+        assert {type(value) for value in read_once(kind, truth, **keys).values()} == {float}
+
+
 def marker_sensor(**keys):
     return Sensor(kind="tissue-deformation", period=1.0, decay_length=0.02, marker_spacing=0.05, **keys)
 
