@@ -3,7 +3,7 @@ from math import inf
 import pytest
 
 from fem_needle import SceneError, build_plant
-from fem_needle.control import choice, controller_of, defaults
+from fem_needle.control import build, controller_of, defaults
 from fem_needle.control.controller import Uncontrolled
 from fem_needle.control.incremental import Incremental
 from fem_needle.control.inverse_dynamics import InverseDynamics
@@ -197,4 +197,4 @@ def test_the_printed_program_needs_pixels(no_model):
 
 
 def test_every_kind_has_a_maker():
-    assert set(choice._MAKERS) | {"none"} == set(VARIANTS)
+    assert set(build._MAKERS) | {"none"} == set(VARIANTS)
