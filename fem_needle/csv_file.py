@@ -10,19 +10,19 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.series_file import described_values
+from fem_needle.series_file import STATION, described_values
 from fem_needle.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
 
 def series_csv(run: Trajectory) -> bytes:
-    """Return `series.csv`: time, every variable over time, and ``guide_force_1``, ``guide_force_2``, ... of the guides."""
+    """Return `series.csv`: time, every variable over time, and a numbered column for each guide or station of the others."""
     columns: dict[str, Array] = {}
     for name, (dimensions, unit, _, values) in described_values(run).items():
         if dimensions == ("time",):
             columns[f"{name} [{unit}]"] = values
-        elif dimensions == ("time", "guide"):
+        elif dimensions in {("time", "guide"), ("time", STATION)}:
             columns |= {f"{name}_{number} [{unit}]": column for number, column in enumerate(values.T, start=1)}
     return _csv(columns, np.column_stack(list(columns.values())))
 

@@ -22,6 +22,7 @@ from fem_needle.plant import Plant
 from fem_needle.run_target import RunTarget
 from fem_needle.samples import Sample
 from fem_needle.scene import Scene
+from fem_needle.scene.steering import SIGNAL_PREFIXES
 from fem_needle.scene_file import load_scene, scene_text
 from fem_needle.series_file import read_series, series_bytes
 from fem_needle.trajectory import VARIABLES, Trajectory, summary_of, trajectory_from_samples
@@ -248,6 +249,7 @@ def load_run(folder: Path) -> Trajectory:
         guide_force=values["guide_force"],
         path_position=values.get("path_position", np.zeros(0)),
         path_deflection=values.get("path_deflection", np.zeros(0)),
+        signals={name: values[name] for name in values if name.startswith(SIGNAL_PREFIXES)},
         arc_length=values["arc_length"],
         station_deflection=values["deflection"],
         summary=summary | {"folder": str(folder.resolve())},

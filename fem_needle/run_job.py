@@ -84,26 +84,31 @@ def shown(job: Job, run: Trajectory, samples: list[Sample]) -> Trajectory:
 
 def stepper_of(job: Job) -> Stepper:
     """Return how the needle gets from one time to the next."""
-    if job.choice.analysis == "dynamic":
-        if job.scene.numerics.time_step == "auto" and needs_no_steps(job.plant.scene):
-            return ModalStepper(job.plant)
-        return DynamicStepper(job.plant, collocation(_spectral_radius(job)))
-    if job.choice.analysis == "static":
-        return StaticStepper(Inviscid(job.plant))
-    return inertia_free_stepper(job.plant)
+    if job.choice.analysis == "dynamic" and job.scene.numerics.time_step == "auto" and needs_no_steps(job.plant.scene):
+        return ModalStepper(job.plant)
+    return time_stepper(job.plant, job.scene, job.choice.analysis)
 
 
-def _spectral_radius(job: Job) -> float:
+def time_stepper(plant: Plant, scene: Scene, analysis: str) -> Stepper:
+    """Return how a needle is stepped: with inertia ("dynamic"), without it ("quasi-static"), or through equilibria ("static")."""
+    if analysis == "dynamic":
+        return DynamicStepper(plant, collocation(_spectral_radius(plant, scene)))
+    if analysis == "static":
+        return StaticStepper(Inviscid(plant))
+    return inertia_free_stepper(plant)
+
+
+def _spectral_radius(plant: Plant, scene: Scene) -> float:
     """Return the scene's, lowered where the plant needs it to stay stable while it moves."""
-    asked = job.scene.numerics.spectral_radius
-    lowest, highest = job.scene.insertion.depth_range(job.scene.duration)
-    moves = highest > lowest or job.scene.insertion.kind == "force"
-    return min(asked, job.plant.largest_spectral_radius) if moves else asked
+    asked = scene.numerics.spectral_radius
+    lowest, highest = scene.insertion.depth_range(scene.duration)
+    moves = highest > lowest or scene.insertion.kind == "force"
+    return min(asked, plant.largest_spectral_radius) if moves else asked
 
 
 def _warnings(job: Job) -> list[str]:
     found = [*job.plant.warnings, *job.chosen.warnings]
-    radius, asked = _spectral_radius(job), job.scene.numerics.spectral_radius
+    radius, asked = _spectral_radius(job.plant, job.scene), job.scene.numerics.spectral_radius
     if job.choice.analysis == "dynamic" and radius < asked:
         found.append(
             f"numerics.spectral_radius = {asked:g} > {radius:g}, with which this model stays stable while it moves: "

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.scene.steering import signal_description
 from fem_needle.trajectory import VARIABLES, Trajectory
 
 Array = NDArray[np.float64]
@@ -28,6 +29,8 @@ FIELDS = {
     "path_deflection": (("path_position",), "m", "rest line of the tissue there"),
 }
 
+STATION = "station"  # of a measured shape, equally spaced from hub to tip
+
 
 def described_values(run: Trajectory) -> dict[str, tuple[tuple[str, ...], str, str, Array]]:
     """Return dimensions, unit, meaning and values of everything that the series of a run hold, by name, in their order."""
@@ -43,7 +46,11 @@ def described_values(run: Trajectory) -> dict[str, tuple[tuple[str, ...], str, s
         "path_deflection": run.path_deflection,
     }
     described = COORDINATES | {name: (("time",), *about) for name, about in VARIABLES.items()} | FIELDS
-    return {name: (*about, np.asarray(values[name], dtype=float)) for name, about in described.items()}
+    found = {name: (*about, np.asarray(values[name], dtype=float)) for name, about in described.items()}
+    for name, signal in run.signals.items():
+        dimensions = ("time",) if signal.ndim == 1 else ("time", STATION)
+        found[name] = (dimensions, *signal_description(name), signal)
+    return found
 
 
 def series_bytes(run: Trajectory) -> bytes:
@@ -56,10 +63,16 @@ def series_bytes(run: Trajectory) -> bytes:
     with h5netcdf.File(memory, "w") as file:
         file.attrs.update({"title": run.scene.title, "Conventions": "CF-1.8", "format": 1})
         sizes = {"time": run.time.size, "arc_length": run.arc_length.size, "guide": guides.size}
-        file.dimensions = sizes | {"path_position": run.path_position.size}
+        file.dimensions = sizes | {"path_position": run.path_position.size} | _stations(run)
         for name, (dimensions, unit, meaning, values) in described.items():
             _add(file, name, dimensions, values, {"units": unit, "long_name": meaning})
     return memory.getvalue()
+
+
+def _stations(run: Trajectory) -> dict[str, int]:
+    """Return the number of stations of a measured shape, if there is one."""
+    counts = [signal.shape[1] for signal in run.signals.values() if signal.ndim > 1]
+    return {STATION: counts[0]} if counts else {}
 
 
 def _add(file: Any, name: str, dimensions: tuple[str, ...], values: Array, attributes: dict[str, str]) -> None:

@@ -79,6 +79,9 @@ class Trajectory:
         Deflection at the stations [m], shape (nt, n).
     path_position, path_deflection
         Where the tip has cut: y [m] and rest line r [m] at the end of the run, shape (points,); empty without a cut path.
+    signals
+        Commands and measurements of a loop, ``command_<input>`` and ``measurement_<reading>``, shape (nt,) or, of several
+        stations, (nt, n); nan where there was none yet; empty without a loop.
     summary
         What ``summary.json`` holds.
     plant, coordinates, point_forces
@@ -93,6 +96,7 @@ class Trajectory:
     station_deflection: Array
     path_position: Array = field(default_factory=lambda: np.zeros(0))
     path_deflection: Array = field(default_factory=lambda: np.zeros(0))
+    signals: dict[str, Array] = field(default_factory=dict)
     summary: dict[str, Any] = field(default_factory=dict)
     plant: Plant | None = None
     coordinates: Array | None = None
@@ -101,7 +105,10 @@ class Trajectory:
     def __getattr__(self, name: str) -> Array:
         if name in VARIABLES and "series" in self.__dict__:
             return self.series[name]
-        raise AttributeError(f"a trajectory has no {name!r}; its variables are {', '.join(VARIABLES)}")
+        if name in self.__dict__.get("signals", ()):
+            return self.signals[name]
+        known = ", ".join([*VARIABLES, *self.__dict__.get("signals", ())])
+        raise AttributeError(f"a trajectory has no {name!r}; its variables are {known}")
 
     def deflection(self, arc_length: Array | None = None, derivative: int = 0) -> Array:
         """Return the deflection [m], or a derivative by arc length, at stations, shape (nt, n).

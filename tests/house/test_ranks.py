@@ -94,6 +94,7 @@ RANKS = {
     # studies of a scene
     "pictures": 0,
     "study_files": 4,
+    "closed_loop": 18,
     "cli": 20,
     "__main__": 21,
 }

@@ -1,0 +1,1 @@
+"""A needle that is steered: inputs, the loop around either model, and what comes of it."""

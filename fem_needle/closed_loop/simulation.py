@@ -1,0 +1,269 @@
+"""A needle whose loop is closed from outside: one call for each stretch of time over which a command holds."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.choices import first_time_step
+from fem_needle.closed_loop.engine import SAME_TIME, engine_of
+from fem_needle.closed_loop.inputs import Inputs, own_value
+from fem_needle.closed_loop.outcome import Effort, first_arrival, outcome
+from fem_needle.closed_loop.truth import State
+from fem_needle.errors import ComputationError, SceneError
+from fem_needle.motion import run_duration
+from fem_needle.plant import Plant
+from fem_needle.run_job import time_stepper
+from fem_needle.samples import Sample
+from fem_needle.scene import Scene
+from fem_needle.sensing.rig import SensorRig
+from fem_needle.skipping import Skipped, unneeded_terms
+from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
+
+Array = NDArray[np.float64]
+Reading = float | Array
+
+OUTPUTS = 200
+LARGEST_DEFLECTION = 0.5  # of the needle's length: beyond it a loop is called unstable
+
+
+class UnstableLoopError(ComputationError):
+    """A loop that drives the needle out of all bounds; ``partial`` is the trajectory so far."""
+
+
+class Simulation:
+    """A needle under way, to be advanced step by step.
+
+    Parameters
+    ----------
+    plant
+        Any model of a needle; its scene says what happens where nothing is commanded.
+    time_step
+        Largest time step [s] of the integrator; "auto": resolves the longest natural period.
+    analysis
+        "dynamic", "quasi-static" or "static"; default: the scene's, and "dynamic" where that says "auto".
+    output_step
+        Time between the samples of `trajectory` [s]; default: the scene's, and a 200th of the run where that says "auto".
+    repetition
+        Which of several runs of the same scene it is: the sensors' noise differs.
+
+    Raises
+    ------
+    SceneError
+        If a setting is impossible.
+
+    Notes
+    -----
+    A command holds until the next one (zero-order hold), within the limits and rates of `Scene.actuators`. The integrator's
+    steps end at every change of a command, so that no pulse is stepped over, however short.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        *,
+        time_step: float | Literal["auto"] | None = None,
+        analysis: str | None = None,
+        output_step: float | None = None,
+        repetition: int = 0,
+    ) -> None:
+        given = {"time_step": time_step, "analysis": analysis, "output_step": output_step}
+        scene = plant.scene.with_values({f"numerics.{key}": value for key, value in given.items() if value is not None})
+        self._started = clock.perf_counter()
+        self.plant, self.scene, self.analysis = plant, scene, analysis_of(scene)
+        self._output_step = output_step_of(scene)
+        step = scene.numerics.time_step
+        self.time_step = step if isinstance(step, float) else first_time_step(plant, self.analysis, self._output_step)
+        self._engine = engine_of(plant, time_stepper(plant, scene, self.analysis), self.time_step)
+        self._rig = SensorRig(scene, scene.run.seed, repetition)
+        self._inputs, self._commands = Inputs(scene), _commanded_names(scene)
+        self._samples: list[Sample] = []
+        self._signals: list[dict[str, Reading]] = []
+        self.stop_reason: str | None = None
+        self._arrival = first_arrival(scene, self.depth, self.tip_deflection)
+        self._efforts: dict[str, Effort] = {}
+        self._rig.sample(self._truth())
+        self._record()
+
+    @property
+    def time(self) -> float:
+        """Time [s]."""
+        return self._engine.time
+
+    @property
+    def depth(self) -> float:
+        """Inserted length [m]."""
+        return self._engine.depth
+
+    @property
+    def tip_deflection(self) -> float:
+        """Lateral displacement of the tip [m], the true one."""
+        return self._truth().tip_deflection
+
+    @property
+    def steps(self) -> int:
+        """How many time steps were taken."""
+        return self._engine.steps
+
+    def step(self, command: Mapping[str, float] | None = None, duration: float | None = None) -> dict[str, Any]:
+        """Let a command act for a while and return what the sensors tell at its end.
+
+        Parameters
+        ----------
+        command
+            Inputs by name, SI: ``push_force``, ``speed``, ``lateral_force``, ``hub_deflection``, ``hub_angle``, ``hub_torque``,
+            ``tip_direction``. What is not named keeps its last command, or the scene's own value where it has none.
+        duration
+            [s]; default: one ``time_step``.
+
+        Returns
+        -------
+        dict
+            The latest readings that have arrived, by name, SI (`fem_needle.scene.steering.READINGS`); of a scene without sensors
+            the exact ``tip_deflection``, ``needle_angle`` and ``depth``.
+
+        Raises
+        ------
+        SceneError
+            If the scene has no such input, a command is not finite, the duration not above 0, or the run has ended.
+        UnstableLoopError
+            If the tip leaves all bounds.
+        ComputationError
+            If a step fails; both with ``partial``, the trajectory so far.
+        """
+        duration = self.time_step if duration is None else duration
+        if not 0.0 < duration < np.inf:
+            raise SceneError(f"duration: out of range (got {duration!r}; allowed above 0 s)")
+        if self.stop_reason is not None:
+            raise SceneError(f"the run has ended at time {self.time:g} s, depth {self.depth:g} m: {self.stop_reason}")
+        inputs = self._inputs.commanded(self.time, command or {})
+        self._commands |= set(command or ())
+        self._inputs = inputs
+        self._engine.command(inputs)
+        try:
+            self._advance(self.time + duration)
+        except ComputationError as error:
+            error.partial = self.trajectory("unstable" if isinstance(error, UnstableLoopError) else "failed")
+            raise
+        return self.measurement()
+
+    def measurement(self) -> dict[str, Any]:
+        """Return what the sensors tell now; see `step`."""
+        if self.scene.sensors:
+            return dict(self._rig.known(self.time))
+        truth = self._truth()
+        angle = float(np.arctan2(truth.tip_deflection, truth.depth)) if truth.depth else 0.0
+        return {"tip_deflection": truth.tip_deflection, "needle_angle": angle, "depth": truth.depth}
+
+    def trajectory(self, stop_reason: str | None = None) -> Trajectory:
+        """Return the run so far, with commands and measurements at each sample."""
+        if self.time > self._samples[-1].time:
+            self._record()
+        run = trajectory_from_samples(self.plant, self._samples, {}, self.scene)
+        run.signals.update(self._signal_arrays())
+        run.summary.update(
+            self.plant.describe()
+            | {
+                "analysis": self.analysis,
+                "time_step": self.time_step,
+                "steps": self.steps,
+                "skipped": [asdict(skipped) for skipped in self._skipped],
+            }
+            | summary_of(run)
+            | outcome(self.scene, self._arrival, self._efforts)
+            | {
+                "error_estimate": None,
+                "warnings": list(self.plant.warnings),
+                "stop_reason": stop_reason or self.stop_reason or "duration",
+                "solve_time": clock.perf_counter() - self._started,
+                "wall_time": clock.perf_counter() - self._started,
+            }
+        )
+        return run
+
+    @cached_property
+    def _skipped(self) -> tuple[Skipped, ...]:
+        asked = () if self.analysis == "dynamic" else (Skipped("inertia", f"analysis = '{self.analysis}' was asked for"),)
+        return (*asked, *unneeded_terms(self.scene))
+
+    def _truth(self) -> State:
+        return State(self.plant, self._engine)
+
+    def _advance(self, end: float) -> None:
+        """Go to a time, with readings and samples on the way."""
+        while self.stop_reason is None and end - self.time > SAME_TIME * self.time_step:
+            following = len(self._samples) * self._output_step
+            until = min(end, self._rig.next_time, following, self._arrival_time())
+            until = end if end - until <= SAME_TIME * self.time_step else until
+            start = self.time
+            self.stop_reason = self._engine.advance(until)
+            self._check_bounds()
+            self._keep_account(start)
+            if self._rig.next_time <= self.time + SAME_TIME * self.time_step:
+                self._rig.sample(self._truth())
+            if following <= self.time + SAME_TIME * self.time_step:
+                self._record()
+
+    def _arrival_time(self) -> float:
+        """Return when the tip will be at the target's depth [s]; infinity where it has been there, or nobody knows."""
+        target = self.scene.target.depth
+        return np.inf if target is None or self._arrival.reached else self._engine.passing_time(target)
+
+    def _keep_account(self, start: float) -> None:
+        truth = self._truth()
+        self._arrival = self._arrival.followed(self.scene, self.time, truth.depth, truth.tip_deflection)
+        for name, ramp in self._inputs.ramps.items():
+            self._efforts[name] = self._efforts.get(name, Effort()).after(ramp, start, self.time)
+
+    def _check_bounds(self) -> None:
+        tip, limit = self._truth().tip_deflection, LARGEST_DEFLECTION * self.scene.needle.length
+        if not abs(tip) <= limit:
+            at = f"at time {self.time:g} s, depth {self.depth:g} m"
+            advice = "use smaller gains, a shorter delay or limits on the actuator; where the tip's response changes its sign, "
+            raise UnstableLoopError(
+                f"the tip has gone to {1e3 * tip:.4g} mm {at}, more than half the needle's length ({1e3 * limit:.4g} mm): the "
+                f"loop is unstable; {advice}schedule = 'model-gain'"
+            )
+
+    def _record(self) -> None:
+        self._samples.append(self._engine.sample())
+        commands: dict[str, Reading] = {f"command_{name}": self._inputs.value(name, self.time) for name in self._commands}
+        known = self._rig.known(self.time)
+        self._signals.append(commands | {f"measurement_{name}": value for name, value in known.items()})
+
+    def _signal_arrays(self) -> dict[str, Array]:
+        """Return commands and measurements over the samples; nan, or the scene's own input, where there was none yet."""
+        found: dict[str, Array] = {}
+        for name in sorted(self._commands):
+            values = [row.get(f"command_{name}", own_value(self.scene, name, sample.time)) for row, sample in self._rows()]
+            found[f"command_{name}"] = np.array(values)
+        for sensor in self.scene.sensors:
+            for name in sensor.readings:
+                empty = np.full(sensor.stations, np.nan) if name == "needle_shape" else np.nan
+                found[f"measurement_{name}"] = np.array([row.get(f"measurement_{name}", empty) for row, _ in self._rows()])
+        return found
+
+    def _rows(self) -> list[tuple[dict[str, Reading], Sample]]:
+        return list(zip(self._signals, self._samples, strict=True))
+
+
+def analysis_of(scene: Scene) -> str:
+    """Return the analysis of a loop: the scene's; with inertia where that says "auto", for a command may excite vibrations."""
+    return "dynamic" if scene.numerics.analysis == "auto" else scene.numerics.analysis
+
+
+def output_step_of(scene: Scene) -> float:
+    """Return the time between the samples of a loop [s]."""
+    step = scene.numerics.output_step
+    return step if isinstance(step, float) else run_duration(scene) / OUTPUTS
+
+
+def _commanded_names(scene: Scene) -> set[str]:
+    """Return the inputs that are recorded from the start: the controller's."""
+    return set() if scene.controller.kind == "none" else {scene.controller.input}
