@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -46,15 +46,25 @@ class RunFolderWriter:
         Whether to write frames for ParaView.
     warnings
         What the summary says besides the run's own warnings.
+    others
+        Further files by name, and what makes them of the run.
 
     Notes
     -----
     Space for the series is held from the start in a file without a name, so that a disk that the frames fill still takes it.
     """
 
-    def __init__(self, target: RunTarget, *, vtk: bool = True, warnings: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        target: RunTarget,
+        *,
+        vtk: bool = True,
+        warnings: Sequence[str] = (),
+        others: Mapping[str, Callable[[Trajectory], bytes]] | None = None,
+    ) -> None:
         target.check()
         self._target, self._vtk, self._warnings = target, vtk, tuple(warnings)
+        self._others = dict(others or {})
         self._folder: Path | None = None
         self._manifest: dict[str, Any] = {}
         self._frames: VtkSeries | None = None
@@ -164,6 +174,8 @@ class RunFolderWriter:
             write_atomically(folder / SERIES, series_bytes(run))
             self._finish_json(run.summary)
             write_atomically(folder / SCENE, scene_text(run.scene).encode("utf-8"))
+            for name, content in self._others.items():
+                write_atomically(folder / name, content(run))
         return run
 
     def _completed(self, summary: dict[str, Any], folder: Path) -> dict[str, Any]:

@@ -40,6 +40,12 @@ def run_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str]) -> It
     yield "tip deflection", f"{tip:.4g} mm (largest {largest:.4g} mm)"
     yield "push force", f"{run.push_force[-1]:.4g} N"
     yield "energy residual", f"{summary['relative_energy_residual']:.1e} of the largest lateral energy"
+    yield from computation_rows(run, folder, known_warnings)
+
+
+def computation_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str]) -> Iterator[Row]:
+    """Yield the rows that tell how a run was computed, how exactly, and where it is."""
+    summary = run.summary
     yield "error estimate", _estimate(summary.get("error_estimate"), run.scene.numerics.tolerance)
     yield "analysis", str(summary["analysis"])
     yield "model", model_text(summary)

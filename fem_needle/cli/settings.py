@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from fem_needle.scene import Scene
 
 
-def changed(scene: Scene, assignments: Sequence[str], options: Mapping[str, Any]) -> Scene:
+def changed(
+    scene: Scene, assignments: Sequence[str], options: Mapping[str, Any], first: Mapping[str, Any] | None = None
+) -> Scene:
     """Return a scene with the settings of the command line.
 
     Parameters
@@ -25,13 +27,15 @@ def changed(scene: Scene, assignments: Sequence[str], options: Mapping[str, Any]
         ``path=value`` each; a value as in a scene file, without quotes where it is a text.
     options
         Path and text (or value) of options; None where not given. They win over assignments; a mesh replaces elements.
+    first
+        Path and value of changes that come before the assignments; None removes what is there.
 
     Raises
     ------
     SceneError
         If an assignment has no path or value, or the changed scene is impossible.
     """
-    values = dict(_assignment(text) for text in assignments)
+    values = dict(first or {}) | dict(_assignment(text) for text in assignments)
     given = {path: value_of(text) if isinstance(text, str) else text for path, text in options.items() if text is not None}
     values |= overriding(given)
     return scene.with_values(values) if values else scene
