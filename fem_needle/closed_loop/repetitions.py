@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,23 +12,52 @@ from fem_needle.scene import Insertion, Scene, Sinusoid, Table
 STREAM = 2**31  # of the scatter's random numbers, apart from those of the sensors
 
 
-def scattered(scene: Scene, repetition: int) -> Scene:
-    """Return the scene of a repetition: 0 is the scene itself; others draw modulus, entry angle and speed.
+@dataclass(frozen=True)
+class Draw:
+    """What a repetition is, beside the scene as it is written.
+
+    Attributes
+    ----------
+    modulus_factor
+        On all foundation moduli and dampings.
+    entry_angle
+        Of the needle at the entry point, added [rad].
+    speed_factor
+        On the insertion's speed; 1 where the scene has none.
+    """
+
+    modulus_factor: float = 1.0
+    entry_angle: float = 0.0
+    speed_factor: float = 1.0
+
+
+def drawn(scene: Scene, repetition: int) -> Draw:
+    """Return what a repetition draws: nothing where it is 0, the scene itself.
 
     Drawn from the scene's seed and the number of the repetition, so that each is the same whenever it is run.
     """
     scatter = scene.scatter
     if repetition == 0 or not (scatter.modulus or scatter.entry_angle or scatter.speed):
-        return scene
+        return Draw()
     draws = np.random.default_rng([scene.run.seed, repetition, STREAM]).standard_normal(3)
+    return Draw(
+        modulus_factor=float(np.exp(scatter.modulus * draws[0])),
+        entry_angle=float(scatter.entry_angle * draws[1]),
+        speed_factor=1.0 if scene.insertion.speed is None else float(np.exp(scatter.speed * draws[2])),
+    )
+
+
+def scattered(scene: Scene, repetition: int) -> Scene:
+    """Return the scene of a repetition: 0 is the scene itself; others draw modulus, entry angle and speed."""
+    draw = drawn(scene, repetition)
     changes: dict[str, Any] = {}
-    if scatter.modulus:
-        changes |= _with_modulus(scene, float(np.exp(scatter.modulus * draws[0])))
-    if scatter.entry_angle:
-        changes |= _with_angle(scene, float(scatter.entry_angle * draws[1]))
-    if scatter.speed:
-        changes |= _with_speed(scene.insertion, float(np.exp(scatter.speed * draws[2])))
-    return scene.with_values(changes)
+    if draw.modulus_factor != 1.0:
+        changes |= _with_modulus(scene, draw.modulus_factor)
+    if draw.entry_angle:
+        changes |= _with_angle(scene, draw.entry_angle)
+    if draw.speed_factor != 1.0:
+        changes |= _with_speed(scene.insertion, draw.speed_factor)
+    return scene.with_values(changes) if changes else scene
 
 
 def _with_modulus(scene: Scene, factor: float) -> dict[str, Any]:

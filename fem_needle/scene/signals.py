@@ -65,6 +65,11 @@ def limit_units(input_name: str) -> dict[str, str]:
     return {"minimum": unit, "maximum": unit, "rate": _product((unit, 1), ("s", -1))}
 
 
+def effort_unit(input_name: str) -> str:
+    """Return the unit of the integral of an input over time."""
+    return _product((INPUT_UNITS.get(input_name, "1"), 1), ("s", 1))
+
+
 def _product(*factors: tuple[str, int]) -> str:
     """Return the unit that is a product of powers of units: of ("N", 1) and ("m/s", -1), ``N s/m``."""
     powers: Counter[str] = Counter()
