@@ -7,13 +7,14 @@ evaluated on its own; nothing is a remainder. Derivation: docs/theory.md, sectio
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
 from fem_needle.collocation import Collocation
+from fem_needle.jumps import clamp_jump
 from fem_needle.path import CutPath
 from fem_needle.plant import Plant, RestTerms
 from fem_needle.stages import Stage, StageSolution, internal_force
@@ -247,10 +248,17 @@ def row_correction(parts: StepParts, *, inertia: bool, at_start: bool) -> Works:
     return Works(boundary_energy=parts.length / 12 * float(slopes[0] if at_start else -slopes[1]))
 
 
+def landing_works(before: StepEnd, after: StepEnd, *, inertia: bool) -> Works:
+    """Return the works at an instant where speed, loads or clamp may jump."""
+    followed = force_jump_work(before, after)
+    return followed + jump_works(before, after) if inertia else followed
+
+
 def jump_works(before: StepEnd, after: StepEnd) -> Works:
     """Return the works at a jump of speed or of the hub's velocity: mean velocity times the jump of momentum.
 
-    The free coordinates' momentum jumps where a rigid guide strikes; the guide's own -R dw/dy is part of the axial force.
+    The free coordinates' momentum jumps where a rigid guide strikes; the guide's own -R dw/dy is part of the axial force. It
+    jumps, too, where viscous tissue holds a needle whose hub jumps: that is the hub's work.
     """
     left, right = before.solution, after.solution
     jump = axial_momentum(after.stage, right.coordinates, right.velocities) - axial_momentum(
@@ -261,17 +269,31 @@ def jump_works(before: StepEnd, after: StepEnd) -> Works:
     clamped = min(2, right.momentum.shape[0])
     hub = float(rates[:clamped] @ (right.momentum - left.momentum)[:clamped]) if np.any(rates) else 0.0
     clamped = after.stage.operators.clamped
-    struck = 0.5 * (left.velocities + right.velocities)[clamped:] @ (right.momentum - left.momentum)[clamped:]
-    return Works(hub_work=hub, boundary_energy=boundary + float(struck))
+    struck = float(0.5 * (left.velocities + right.velocities)[clamped:] @ (right.momentum - left.momentum)[clamped:])
+    if clamp_jump(after.stage, left.coordinates) is not None:
+        return Works(hub_work=hub + struck, boundary_energy=boundary)
+    return Works(hub_work=hub, boundary_energy=boundary + struck)
 
 
 def force_jump_work(before: StepEnd, after: StepEnd) -> Works:
-    """Return the work at a jump of the loads that a needle without inertia follows at once: mean force x jump of deflection."""
+    """Return the works at a jump of the loads or of the clamp that the needle follows at once: mean force x jump of deflection.
+
+    With inertia a jump of the loads moves the kink at a point inside an element only. The work of a clamp that jumps is what
+    bending, tissue and points resist: what viscosity takes meanwhile grows as one over the time that is left, and stands on
+    neither side.
+    """
     left, right = before.solution, after.solution
     points = after.stage.points
     moved = points.deflections(right.coordinates, right.forces) - points.deflections(left.coordinates, left.forces)
     mean = 0.5 * (left.forces + right.forces)
-    return Works(load_work=float(mean[points.guides :] @ moved[points.guides :]))
+    load = float(mean[points.guides :] @ moved[points.guides :])
+    if clamp_jump(after.stage, left.coordinates) is None:
+        return Works(load_work=load)
+    stage, still = after.stage, np.zeros_like(left.coordinates)
+    instant = replace(stage.instant, speed=0.0)
+    elastic = internal_force(replace(stage, instant=instant), 0.5 * (left.coordinates + right.coordinates), still)
+    resisted = elastic + points.rows.T @ mean
+    return Works(load_work=load, hub_work=-float(resisted @ (right.coordinates - left.coordinates)))
 
 
 def _hub_power(stage: Stage, solution: StageSolution, *, inertia: bool) -> float:

@@ -13,7 +13,7 @@ from fem_needle import axial
 from fem_needle.banded import SingularMatrixError
 from fem_needle.errors import ComputationError
 from fem_needle.initial import initial_state
-from fem_needle.ledger import StepEnd, Works, energies, force_jump_work, jump_works, row_correction, step_works
+from fem_needle.ledger import StepEnd, Works, energies, landing_works, row_correction, step_works
 from fem_needle.motion import DepthLaw, Motion, depth_law, landing_times, run_duration
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample, sample_step
@@ -201,7 +201,7 @@ def pass_landing(
         dropped = trivial_solution(plant, before.stage)
         return StepEnd(before.stage, dropped), Works(boundary_energy=-held)
     after = stepper.start(law, time, until, before)
-    return after, jump_works(before, after) if stepper.inertia else force_jump_work(before, after)
+    return after, landing_works(before, after, inertia=stepper.inertia)
 
 
 def _advance(plant: Plant, stepper: Stepper, law: Motion, state: StepEnd, until: float, last: Step | None) -> Step:

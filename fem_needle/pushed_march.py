@@ -11,7 +11,7 @@ from fem_needle import axial
 from fem_needle.banded import SingularMatrixError
 from fem_needle.errors import ComputationError
 from fem_needle.initial import initial_state
-from fem_needle.ledger import Works, jump_works, row_correction, step_works
+from fem_needle.ledger import Works, jump_works, landing_works, row_correction, step_works
 from fem_needle.march import RunEnd, TimeGrid, row_change
 from fem_needle.motion import depth_law, shortest_period
 from fem_needle.plant import Plant
@@ -63,6 +63,8 @@ class PushMarching:
         How many were taken.
     landed
         Whether the next step begins at a kink.
+    started
+        Whether the needle has begun under the scene's own inputs, so that works count from the first step on.
     """
 
     pusher: Pusher
@@ -73,6 +75,7 @@ class PushMarching:
     last: Step | None = None
     steps: int = 0
     landed: bool = False
+    started: bool = False
 
     @property
     def time(self) -> float:
@@ -129,8 +132,8 @@ class PushMarching:
     def _take(self, step: PushStep) -> None:
         """Add a step's works, and stop a needle dead at a membrane that it cannot pierce."""
         lateral, inertia = step.lateral, self.pusher.stepper.inertia
-        if inertia and self.steps:
-            self.works = self.works + jump_works(self.state.end, lateral.ends[0])
+        if self.steps or self.started:
+            self.works = self.works + landing_works(self.state.end, lateral.ends[0], inertia=inertia)
         self.works = self.works + row_change(self.last, lateral, landed=self.landed, inertia=inertia)
         self.works = self.works + step.works + step_works(lateral, inertia=inertia)
         self.landed = step.event is not None

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.collocation import Collocation, gauss
+from fem_needle.jumps import carried, clamp_jump
 from fem_needle.ledger import StepEnd, StepParts
 from fem_needle.loads import LoadCase, is_steady, load_case
 from fem_needle.motion import Instant, Motion
@@ -96,21 +97,25 @@ class DynamicStepper:
         object.__setattr__(self, "_steady", is_steady(self.plant.scene))
 
     def start(self, law: Motion, time: float, until: float, before: StepEnd) -> StepEnd:
-        """Carry coordinates and momentum over a possible jump of speed or of the hub's velocity."""
+        """Carry coordinates and momentum over a possible jump of speed, of the loads, of the hub or of its velocity."""
         middle = law.layer_depth(time, until)
         instant = self._one_sided(law.after(time), middle)
-        stage = evaluate_stage(self.plant, instant, self._loads(middle, time, before.stage), before.stage)
+        stage = evaluate_stage(self.plant, instant, load_case(self.plant.scene, middle, time), before.stage)
         solution, guides, path = before.solution, stage.points.guides, before.path
         if path is not None:
             stage = with_path(self.plant, stage, path)
         forces = np.concatenate([solution.forces[:guides], stage.case.forces])
-        after = self._state(stage, solution.coordinates, solution.momentum, forces, path)
-        same = time > 0.0 and np.allclose(forces[guides:], solution.forces[guides:], rtol=1e-9, atol=0.0)
+        same = np.allclose(forces[guides:], solution.forces[guides:], rtol=1e-9, atol=0.0)
+        jump = clamp_jump(stage, solution.coordinates)
         if self.inertia:
-            return self._struck(after)
-        if same:  # at t = 0 a needle without inertia need not be where the loads hold it
+            carrying = solution if jump is None else carried(stage, solution, jump)
+            if jump is not None or not same:
+                forces = self._with_reactions(stage, carrying.coordinates, forces)
+            return self._struck(self._state(stage, carrying.coordinates, carrying.momentum, forces, path))
+        after = self._state(stage, solution.coordinates, solution.momentum, forces, path)
+        if time > 0.0 and same and jump is None:  # at t = 0 a needle without inertia need not be where the loads hold it
             return after
-        return self._followed(after, until)
+        return self._followed(after, until, jump)
 
     def _one_sided(self, instant: Instant, layer_depth: float) -> Instant:
         layers = self.plant.scene.tissue.layers
@@ -131,12 +136,15 @@ class DynamicStepper:
         struck[clamped:] -= rows.T @ np.linalg.solve(mobility, sliding)
         return self._state(stage, solution.coordinates, struck, solution.forces, start.path)
 
-    def _followed(self, start: StepEnd, until: float) -> StepEnd:
-        """Let a needle without inertia follow a jump of the loads: what no viscosity holds moves at once."""
+    def _followed(self, start: StepEnd, until: float, jump: Array | None) -> StepEnd:
+        """Let a needle without inertia follow a jump of the loads or of the hub: what no viscosity holds moves at once."""
         instant = start.stage.instant
         frozen = _Frozen(replace(instant, speed=0.0, acceleration=0.0))
         length = JUMP_FRACTION * (until - instant.time)
-        step = self._attempt(frozen, start, instant.time + length, None, None)
+        rates = np.zeros(2)
+        if jump is not None:
+            rates[: len(jump)] = jump / length
+        step = self._attempt(frozen, start, instant.time + length, None, None, rates)
         return StepEnd(start.stage, step.ends[1].solution, start.path)
 
     def advance(self, law: Motion, start: StepEnd, until: float, last: Step | None) -> Step:
@@ -156,11 +164,15 @@ class DynamicStepper:
             tips = found
         raise FloatingPointError("the cut path does not converge")
 
-    def _attempt(self, law: Motion, start: StepEnd, until: float, last: Step | None, cut: _Cut | None) -> Step:
-        """Solve one step, with the path cut through given tips at the nodes where there is one."""
+    def _attempt(
+        self, law: Motion, start: StepEnd, until: float, last: Step | None, cut: _Cut | None, rates: Array | None = None
+    ) -> Step:
+        """Solve one step, with the path cut through given tips at the nodes where there is one, and given rates of the clamp."""
         time = start.stage.instant.time
         length, middle = until - time, law.layer_depth(time, until)
         stages = self._stages(law, start, until, last, cut)
+        if rates is not None:
+            stages = _with_clamp_rates(stages[0], rates), _with_clamp_rates(stages[1], rates)
         system = _reusable(last, stages, length) or factor_step(self.plant, stages, self.method, length)
         begin = start.solution
         solutions = solve_step(self.plant, stages, self.method, length, system, begin.coordinates, begin.momentum)
@@ -218,11 +230,15 @@ class DynamicStepper:
         N q + B P + compliance R = 0 for all guides together, except those rigid ones at a node, whose B vanishes: the mean over
         the step, about which the values at the nodes alternate (an index-3 multiplier).
         """
-        points, guides = stage.points, stage.points.guides
+        guides = stage.points.guides
         if not guides:
             return np.zeros(0)
         weighted = [w * s.forces[:guides] for w, s in zip(self.method.weights, solutions, strict=True)]
-        forces = np.concatenate([np.sum(weighted, axis=0), stage.case.forces])
+        return self._with_reactions(stage, coordinates, np.concatenate([np.sum(weighted, axis=0), stage.case.forces]))[:guides]
+
+    def _with_reactions(self, stage: Stage, coordinates: Array, forces: Array) -> Array:
+        """Return the forces at points with those of the guides, but of rigid ones at a node, that belong to the deflections."""
+        points, guides, forces = stage.points, stage.points.guides, forces.copy()
         compliance = points.flexibility[:guides, :guides] + np.diag(points.guide_compliance)
         # Beside the compliance of the whole needle seen from the guide, which B cannot exceed.
         soft = np.flatnonzero(np.diag(compliance) > SMALLEST_COMPLIANCE * self.compliance_scale)
@@ -230,7 +246,7 @@ class DynamicStepper:
             others = np.delete(np.arange(len(forces)), soft)
             gap = points.rows[soft] @ coordinates + points.flexibility[np.ix_(soft, others)] @ forces[others]
             forces[soft] = np.linalg.solve(compliance[np.ix_(soft, soft)], -gap)
-        return forces[:guides]
+        return forces
 
     @property
     def compliance_scale(self) -> float:
@@ -250,7 +266,7 @@ class DynamicStepper:
                 earlier = last.stages[number]
             # A node at the end belongs to this step: loads, swelling and layers just before a kink.
             instant = replace(instant, time=min(instant.time, latest))
-            case = self._loads(middle, instant.time, earlier)
+            case = self._loads(middle, instant.time, start.stage)
             earlier = evaluate_stage(self.plant, instant, case, earlier)
             found.append(earlier)
         if cut is not None and start.path is not None:
@@ -273,6 +289,10 @@ class DynamicStepper:
         velocities = velocities_of(self.plant, stage, coordinates, start_momentum)
         full = momentum(stage, coordinates, velocities)
         return StepEnd(stage, StageSolution(coordinates, velocities, full, forces), path)
+
+
+def _with_clamp_rates(stage: Stage, rates: Array) -> Stage:
+    return replace(stage, case=replace(stage.case, clamp_rates=rates))
 
 
 def _reusable(last: Step | None, stages: tuple[Stage, Stage], length: float) -> StepSystem | None:

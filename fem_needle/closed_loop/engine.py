@@ -165,6 +165,9 @@ class PositionEngine:
         while until - self.time > SAME_TIME * self._time_step:
             if self._segment is None:
                 self._segment = self._next_segment()
+                reason = self._end_reason()
+                if reason is not None:
+                    return reason
                 self._march.stepper, self._march.law = self._segment.stepper, self._segment.law
                 self._march.land(min(until, self._segment.until), counted=True)
             end = _end(until, self._segment.until, self._time_step)
@@ -178,9 +181,9 @@ class PositionEngine:
 
     def passing_time(self, level: float) -> float:
         """Return when the tip will pass a depth [m] as things are [s]; infinity where it will not."""
-        law = self._march.law
-        if isinstance(law, CommandedMotion):
-            return law.passing_time(level)
+        if "speed" in self._inputs.ramps:
+            segment = self._segment or self._next_segment()
+            return min(segment.law.passing_time(level), segment.until) if isinstance(segment.law, CommandedMotion) else inf
         if level not in self._crossings:
             self._crossings[level] = self._law.crossings(level, run_duration(self._march.plant.scene))
         return next((time for time in self._crossings[level] if time > self.time), inf)
@@ -217,7 +220,8 @@ class PositionEngine:
         """Return why a commanded speed ends the run here."""
         if "speed" not in self._inputs.ramps:
             return None
-        depth, speed, limits = self.depth, self._inputs.value("speed", self.time), self._limits
+        ramp, depth, limits = self._inputs.ramps["speed"], self.depth, self._limits
+        speed = ramp.value(self.time) or ramp.slope(self.time)
         slack = SAME_DEPTH * self._march.plant.scene.needle.length
         if limits.final_depth is not None and speed > 0.0 and abs(depth - limits.final_depth) <= slack:
             return "final-depth"
@@ -247,6 +251,8 @@ class PushEngine:
         trial = replace(self._march)
         trial.advance(min(self._time_step, self._kinks.after(0.0)))
         self._first = trial.sample(at_start=True)
+        begun = self._march.state if trial.last is None else replace(self._march.state, end=trial.last.ends[0])
+        self._march.state, self._march.started = begun, True
 
     @property
     def time(self) -> float:
@@ -287,10 +293,17 @@ class PushEngine:
         while until - self.time > SAME_TIME * self._time_step:
             if self.time >= self._until - SAME_TIME * self._time_step:
                 self._drive()
-            end = _end(until, self._until, self._time_step)
-            count = max(1, ceil((end - self.time) / self._time_step - 1e-9))
-            following = self.time + (end - self.time) / count
-            reason = self._march.advance(end if count == 1 else following)
+            reason = self._go(_end(until, self._until, self._time_step))
+            if reason is not None:
+                return reason
+        return None
+
+    def _go(self, end: float) -> str | None:
+        """Take equal steps to a time, shorter ones up to what happens on the way."""
+        length = (end - self.time) / max(1, ceil((end - self.time) / self._time_step - 1e-9))
+        while self.time < end:
+            following = self.time + length
+            reason = self._march.advance(end if end - following < SAME_TIME * length else following)
             # Whoever commands the push can push harder.
             if reason is not None and not (reason == "stuck" and "push_force" in self._inputs.ramps):
                 return reason

@@ -28,6 +28,7 @@ from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_sample
 
 Array = NDArray[np.float64]
 Reading = float | Array
+Row = tuple[Sample, dict[str, Reading]]
 
 OUTPUTS = 200
 LARGEST_DEFLECTION = 0.5  # of the needle's length: beyond it a loop is called unstable
@@ -83,13 +84,12 @@ class Simulation:
         self._engine = engine_of(plant, time_stepper(plant, scene, self.analysis), self.time_step)
         self._rig = SensorRig(scene, scene.run.seed, repetition)
         self._inputs, self._commands = Inputs(scene), _commanded_names(scene)
-        self._samples: list[Sample] = []
-        self._signals: list[dict[str, Reading]] = []
+        self._rows: list[Row] = []
         self.stop_reason: str | None = None
         self._arrival = first_arrival(scene, self.depth, self.tip_deflection)
         self._efforts: dict[str, Effort] = {}
         self._rig.sample(self._truth())
-        self._record()
+        self._rows.append(self._row())
 
     @property
     def time(self) -> float:
@@ -162,11 +162,12 @@ class Simulation:
         return {"tip_deflection": truth.tip_deflection, "needle_angle": angle, "depth": truth.depth}
 
     def trajectory(self, stop_reason: str | None = None) -> Trajectory:
-        """Return the run so far, with commands and measurements at each sample."""
-        if self.time > self._samples[-1].time:
-            self._record()
-        run = trajectory_from_samples(self.plant, self._samples, {}, self.scene)
-        run.signals.update(self._signal_arrays())
+        """Return the run so far, with commands and measurements at each sample; of an interrupted one up to the last sample."""
+        rows = [*self._rows]
+        if stop_reason != "interrupted" and self.time > rows[-1][0].time:
+            rows.append(self._row())
+        run = trajectory_from_samples(self.plant, [sample for sample, _ in rows], {}, self.scene)
+        run.signals.update(self._signal_arrays(rows))
         run.summary.update(
             self.plant.describe()
             | {
@@ -198,7 +199,7 @@ class Simulation:
     def _advance(self, end: float) -> None:
         """Go to a time, with readings and samples on the way."""
         while self.stop_reason is None and end - self.time > SAME_TIME * self.time_step:
-            following = len(self._samples) * self._output_step
+            following = len(self._rows) * self._output_step
             until = min(end, self._rig.next_time, following, self._arrival_time())
             until = end if end - until <= SAME_TIME * self.time_step else until
             start = self.time
@@ -208,7 +209,7 @@ class Simulation:
             if self._rig.next_time <= self.time + SAME_TIME * self.time_step:
                 self._rig.sample(self._truth())
             if following <= self.time + SAME_TIME * self.time_step:
-                self._record()
+                self._rows.append(self._row())
 
     def _arrival_time(self) -> float:
         """Return when the tip will be at the target's depth [s]; infinity where it has been there, or nobody knows."""
@@ -231,26 +232,23 @@ class Simulation:
                 f"loop is unstable; {advice}schedule = 'model-gain'"
             )
 
-    def _record(self) -> None:
-        self._samples.append(self._engine.sample())
+    def _row(self) -> Row:
+        """Return what is known of the present instant, with commands and measurements."""
         commands: dict[str, Reading] = {f"command_{name}": self._inputs.value(name, self.time) for name in self._commands}
         known = self._rig.known(self.time)
-        self._signals.append(commands | {f"measurement_{name}": value for name, value in known.items()})
+        return self._engine.sample(), commands | {f"measurement_{name}": value for name, value in known.items()}
 
-    def _signal_arrays(self) -> dict[str, Array]:
+    def _signal_arrays(self, rows: list[Row]) -> dict[str, Array]:
         """Return commands and measurements over the samples; nan, or the scene's own input, where there was none yet."""
         found: dict[str, Array] = {}
         for name in sorted(self._commands):
-            values = [row.get(f"command_{name}", own_value(self.scene, name, sample.time)) for row, sample in self._rows()]
+            values = [known.get(f"command_{name}", own_value(self.scene, name, sample.time)) for sample, known in rows]
             found[f"command_{name}"] = np.array(values)
         for sensor in self.scene.sensors:
             for name in sensor.readings:
                 empty = np.full(sensor.stations, np.nan) if name == "needle_shape" else np.nan
-                found[f"measurement_{name}"] = np.array([row.get(f"measurement_{name}", empty) for row, _ in self._rows()])
+                found[f"measurement_{name}"] = np.array([known.get(f"measurement_{name}", empty) for _, known in rows])
         return found
-
-    def _rows(self) -> list[tuple[dict[str, Reading], Sample]]:
-        return list(zip(self._signals, self._samples, strict=True))
 
 
 def analysis_of(scene: Scene) -> str:

@@ -53,6 +53,7 @@ RANKS = {
     "rounding": 5,
     # time: stages, ledger, steps, the loop; no mesh
     "stages": 6,
+    "jumps": 6.5,
     "ledger": 7,
     "initial": 8,
     "steppers": 8,
