@@ -15,6 +15,7 @@ Quick = Annotated[bool, typer.Option("--quick", help="Only the sections at rest:
 def register(application: typer.Typer) -> None:
     """Add the command."""
     application.command("validate")(validate)
+    application.command("experiments")(experiments)
 
 
 def validate(out: Out = None, quick: Quick = False) -> None:
@@ -29,4 +30,19 @@ def validate(out: Out = None, quick: Quick = False) -> None:
         typer.echo(page(found, quick=quick), nl=False)
         return
     for path in write_page(out, found, quick=quick):
+        typer.echo(f"wrote {path}")
+
+
+def experiments(out: Out = None) -> None:
+    """Repeat the thesis' control experiments and compare controllers: the page docs/steering.md; minutes.
+
+    Example: fem-needle experiments --out steering.md
+    """
+    from reduced_model.steering.page import page, sections, write_page
+
+    found = sections()
+    if out is None:
+        typer.echo(page(found), nl=False)
+        return
+    for path in write_page(out, found):
         typer.echo(f"wrote {path}")

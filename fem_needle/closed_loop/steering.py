@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fem_needle.choices import first_time_step
+from fem_needle.closed_loop.fully_actuated import fully_actuated
 from fem_needle.closed_loop.inputs import with_inputs
 from fem_needle.closed_loop.repetitions import scattered
 from fem_needle.closed_loop.simulation import Simulation, analysis_of, output_step_of
@@ -35,6 +36,11 @@ USUAL_COMMANDS = {
 }
 
 Log = list[tuple[float, dict[str, float]]]
+Progress = Callable[[float], None]
+
+
+def _nobody(fraction: float) -> None:
+    """Tell nobody."""
 
 
 @dataclass(frozen=True)
@@ -51,43 +57,59 @@ class Loop:
         Between two decisions [s].
     repetition
         Number of the run among its repetitions.
+    progress
+        Is told which share of a run is done; every finer run starts again.
     """
 
     plant: Plant
     controller: Controller[Any]
     period: float
     repetition: int = 0
+    progress: Progress = _nobody
 
     def run(self, time_step: float) -> tuple[Trajectory, Log]:
-        """Return the run with steps of at most ``time_step`` [s], and what was commanded when.
+        """Return the run with steps of at most ``time_step`` [s], and what was commanded when; interrupted, as far as it got.
 
         Raises
         ------
         ComputationError
             If a step fails, the controller cannot go on, or the loop is unstable; with ``partial``, the trajectory so far.
         """
-        simulation = Simulation(self.plant, time_step=time_step, repetition=self.repetition)
-        log: Log = []
-        state, measurement = self.controller.begin(), simulation.measurement()
-        for until in self._ticks():
-            if simulation.stop_reason is not None:
-                break
-            try:
-                state, command = self.controller.update(state, simulation.time, measurement)
-            except ComputationError as error:
-                error.partial = simulation.trajectory("failed")
-                raise
-            log.append((until, command))
-            measurement = simulation.step(command, until - simulation.time)
+        simulation, log = self._simulation(time_step), Log()
+        try:
+            state, measurement = self.controller.begin(), simulation.measurement()
+            for until in self._ticks():
+                if simulation.stop_reason is not None:
+                    break
+                state, command = self._decided(simulation, state, measurement)
+                log.append((until, command))
+                measurement = simulation.step(command, until - simulation.time)
+                self.progress(until / run_duration(self.plant.scene))
+        except KeyboardInterrupt:
+            return simulation.trajectory("interrupted"), log
         return simulation.trajectory(), log
 
     def replay(self, log: Log, time_step: float) -> Trajectory:
-        """Return the run with the commands of another one."""
-        simulation = Simulation(self.plant, time_step=time_step, repetition=self.repetition)
-        for until, command in log:
-            if simulation.stop_reason is None:
-                simulation.step(command, until - simulation.time)
+        """Return the run with the commands of another one; interrupted, as far as it got."""
+        simulation = self._simulation(time_step)
+        try:
+            for until, command in log:
+                if simulation.stop_reason is None:
+                    simulation.step(command, until - simulation.time)
+                    self.progress(until / log[-1][0])
+        except KeyboardInterrupt:
+            return simulation.trajectory("interrupted")
         return simulation.trajectory()
+
+    def _simulation(self, time_step: float) -> Simulation:
+        return Simulation(self.plant, time_step=time_step, repetition=self.repetition)
+
+    def _decided(self, simulation: Simulation, state: Any, measurement: Mapping[str, Any]) -> tuple[Any, dict[str, float]]:
+        try:
+            return self.controller.update(state, simulation.time, measurement)
+        except ComputationError as error:
+            error.partial = simulation.trajectory("failed")
+            raise
 
     def _ticks(self) -> list[float]:
         """Return the ends of the intervals over which a command holds [s]."""
@@ -102,6 +124,7 @@ def steer(
     controller: Controller[Any] | None = None,
     plant: Plant | None = None,
     repetition: int = 0,
+    progress: Progress = _nobody,
 ) -> Trajectory:
     """Steer a needle as ``fem-needle steer`` does.
 
@@ -116,11 +139,14 @@ def steer(
         The needle in place of the scene's, for a controller that believes in a wrong one.
     repetition
         0 is the scene as it is; from 1 on, ``[scatter]`` makes each run different.
+    progress
+        Is told which share of a run is done, 0 to 1; from 0 again where it is computed with finer steps.
 
     Returns
     -------
     Trajectory
-        With ``command_*`` and ``measurement_*`` as `signals`.
+        With ``command_*`` and ``measurement_*`` as `signals`. On an interrupt, of what was computed, with
+        ``summary["stop_reason"] == "interrupted"``.
 
     Raises
     ------
@@ -137,9 +163,11 @@ def steer(
     if controller is None:
         controller = controller_of(scene)
     needle = chosen_plant(scattered(scene, repetition)) if plant is None else plant
+    if scene.controller.variant == "fully-actuated":
+        return fully_actuated(needle)
     for message in needle.warnings:
         warnings.warn(message, SuspiciousValueWarning, stacklevel=2)
-    return _refined(Loop(needle, controller, scene.controller.period, repetition))
+    return _refined(Loop(needle, controller, scene.controller.period, repetition, progress))
 
 
 def chosen_plant(scene: Scene) -> Plant:
@@ -169,7 +197,12 @@ def _refined(loop: Loop) -> Trajectory:
         return loop.run(step)[0]
     run, log = loop.run(step)
     for _ in range(MOST_REFINEMENTS):
+        if _is_interrupted(run):
+            return run
         finer = loop.replay(log, step / 2)
+        if _is_interrupted(finer):
+            run.summary["stop_reason"] = "interrupted"
+            return run
         error = tip_difference(run, finer)
         run.summary["error_estimate"] = error
         if error <= scene.numerics.tolerance:
@@ -179,6 +212,10 @@ def _refined(loop: Loop) -> Trajectory:
     missed = f"the tolerance {scene.numerics.tolerance:g} was not reached with steps of {step:g} s: see error_estimate"
     run.summary["warnings"] = [*run.summary["warnings"], missed]
     return run
+
+
+def _is_interrupted(run: Trajectory) -> bool:
+    return bool(run.summary["stop_reason"] == "interrupted")
 
 
 def tip_difference(run: Trajectory, finer: Trajectory) -> float:

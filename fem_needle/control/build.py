@@ -48,13 +48,20 @@ def controller_of(scene: Scene, model: Plant | None = None) -> Controller[Any]:
     return _MAKERS[controller.kind](Settings(scene, model))
 
 
+def reference(scene: Scene) -> float:
+    """Return where the output shall be, SI: the target's depth where the output is the depth, else its lateral place."""
+    if scene.controller.output == "depth" and scene.target.depth is not None:
+        return scene.target.depth
+    return scene.target.lateral
+
+
 def _common(settings: Settings) -> dict[str, Any]:
     scene = settings.scene
     controller = scene.controller
     return {
         "input": controller.input,
         "read": output_reader(controller.output),
-        "target": scene.target.lateral,
+        "target": reference(scene),
         "limits": settings.limits,
         "initial": own_value(scene, controller.input),
     }

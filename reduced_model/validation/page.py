@@ -58,8 +58,19 @@ def write_page(file: Path, found: list[Section], *, quick: bool = False) -> tupl
     SceneError
         If it cannot be written.
     """
+    return write_files(file, page(found, quick=quick), found)
+
+
+def write_files(file: Path, text: str, found: list[Section]) -> tuple[Path, ...]:
+    """Write a page and the pictures of its sections; return what was written.
+
+    Raises
+    ------
+    SceneError
+        If it cannot be written.
+    """
     folder = file.parent / "pictures"
-    contents = {file: page(found, quick=quick).encode()}
+    contents = {file: text.encode()}
     for section in found:
         contents |= {folder / name: draw() for name, draw in section.pictures.items()}
     try:
