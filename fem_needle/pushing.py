@@ -285,15 +285,18 @@ def locate(pusher: Pusher, state: PushState, until: float, direction: int, event
 
     length = until - state.time
     low, high = state.time, until
+    short: PushStep | None = None
     low_value, (found, high_value) = -inf, tried(until)
     while high - low > TIME_RESOLUTION * length:
         time = _between(low, high, low_value, high_value)
         step, value = tried(time)
         if value < 0:
-            low, low_value = time, value
+            low, low_value, short = time, value, step
             found = step if high_value == inf else found
         else:
             high, high_value, found = time, value, step or found
+    if kind == "reaches":  # a node at the end of a step that goes beyond would be in the layer ahead
+        found = short or found
     if found is None or (kind == "reaches" and abs(found.state.depth - level) > LANDING * (abs(level) + abs(state.depth))):
         raise FloatingPointError("the insertion speed does not converge")
     if kind != "reaches":

@@ -102,7 +102,7 @@ def _spectral_radius(plant: Plant, scene: Scene) -> float:
     """Return the scene's, lowered where the plant needs it to stay stable while it moves."""
     asked = scene.numerics.spectral_radius
     lowest, highest = scene.insertion.depth_range(scene.duration)
-    moves = highest > lowest or scene.insertion.kind == "force"
+    moves = highest > lowest or scene.insertion.kind in {"force", "speed"}  # a speed of 0 may be commanded to change
     return min(asked, plant.largest_spectral_radius) if moves else asked
 
 

@@ -102,8 +102,9 @@ class _Kinks:
 
     def after(self, time: float) -> float:
         """Return the first kink after a time [s], infinity where none is near."""
-        if 2.0 * time >= self._horizon:
-            self._horizon = 4.0 * max(time, run_duration(self._plant.scene))
+        if time >= self._horizon:
+            planned = run_duration(self._plant.scene)
+            self._horizon = planned if time < planned else 4.0 * time
             found = landing_times(self._plant.scene, self._law, self._horizon, self._plant.smallest_depth)
             self._times = np.array([*found, self._horizon])
         return float(self._times[np.searchsorted(self._times, time, side="right")])
