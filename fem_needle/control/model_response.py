@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from fem_needle.analysis.depth_gains import END, SHALLOWEST, tip_gains
+from fem_needle.analysis.depth_gains import END, SHALLOWEST
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.linear.linearization import lateral_inputs, reach
-from fem_needle.loads import load_case
+from fem_needle.loads import LoadCase, load_case
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene, TipLoad
 from fem_needle.scene.cross_checks import input_obstacle
 from fem_needle.segments import interfaces
+from fem_needle.statics import static_state
 
 Array = NDArray[np.float64]
 
@@ -172,14 +173,24 @@ def _piece(plant: Plant, index: int, name: str, ends: tuple[float, float]) -> _P
     """Return a piece; the layer at the tip, and so every load, is the same in all of it."""
     case = load_case(_unturned(plant.scene) if name == "tip_direction" else plant.scene, 0.5 * (ends[0] + ends[1]), 0.0)
     acting = np.concatenate([case.forces, case.clamp])
-    own = acting[index] if name == "tip_direction" else 1.0
+    unit = np.zeros_like(acting)
+    unit[index] = acting[index] if name == "tip_direction" else 1.0
     acting[index] = 0.0
+    cases = [_still(case, loads) for loads in (unit, acting)]
 
     def answer(depth: float) -> tuple[float, float]:
-        gains = tip_gains(plant, depth)[:-1]
-        return float(gains[index] * own), float(gains @ acting[: len(gains)])
+        operators, points = plant.operators(depth, 0.0), plant.points(depth)
+        states = [static_state(plant, operators, points, loads, depth=depth, time=0.0) for loads in cases]
+        gain, rest = (float(points.deflections(*state)[-1]) for state in states)
+        return gain, rest
 
     return _Piece(*ends, answer)
+
+
+def _still(case: LoadCase, loads: Array) -> LoadCase:
+    """Return a case with other forces and another place of the hub, at rest."""
+    forces, clamp = loads[: len(case.forces)], loads[len(case.forces) :]
+    return LoadCase(forces, np.zeros_like(forces), clamp, np.zeros_like(clamp), np.zeros_like(clamp))
 
 
 def _unturned(scene: Scene) -> Scene:
