@@ -19,6 +19,7 @@ from fem_needle.errors import NeedleError, SceneError, SuspiciousValueWarning
 GROUPS = (
     "fem_needle.cli.scene_commands",
     "fem_needle.cli.run",
+    "fem_needle.cli.steer",
     "fem_needle.cli.export",
     "fem_needle.cli.converge",
     "fem_needle.cli.analyze",

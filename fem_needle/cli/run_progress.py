@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import shorten
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from fem_needle.samples import Sample
 
 PATIENCE = 1.0  # s
+LONGEST_TITLE = 36  # characters: a longer one leaves no room for the bar
 
 
 class ProgressBar:
@@ -24,7 +26,7 @@ class ProgressBar:
     """
 
     def __init__(self, title: str) -> None:
-        self._title = title
+        self._title = shorten(title, LONGEST_TITLE, placeholder="...")
         self._started = perf_counter()
         self._bar: Progress | None = None
         self._task: TaskID | None = None

@@ -21,6 +21,7 @@ from fem_needle.models import build_plant, model_family
 from fem_needle.motion import run_duration
 from fem_needle.plant import Plant
 from fem_needle.run_job import time_stepper
+from fem_needle.scene import Controller as ControllerSettings
 from fem_needle.scene import Scene
 from fem_needle.steppers import StaticStepper
 from fem_needle.trajectory import Trajectory
@@ -225,7 +226,7 @@ def tip_difference(run: Trajectory, finer: Trajectory) -> float:
     return float(np.max(np.abs(run.tip_deflection[:count] - finer.tip_deflection[:count]))) / scale
 
 
-def described(controller: Mapping[str, Any]) -> str:
+def described(controller: ControllerSettings) -> str:
     """Return a controller in words."""
-    parts = [str(controller["kind"]), *(str(controller[key]) for key in ("variant", "schedule") if key in controller)]
-    return ", ".join(part for part in parts if part != "none") or "none"
+    parts = [controller.kind, controller.variant, controller.schedule]
+    return ", ".join(part for part in parts if part not in {None, "none"}) or "none"
