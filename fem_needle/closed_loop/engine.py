@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import ceil, inf
 from typing import Any, Protocol
 
 import numpy as np
 
-from fem_needle.closed_loop.inputs import Inputs
+from fem_needle.closed_loop.inputs import Driven, Inputs
 from fem_needle.closed_loop.motion import CommandedMotion
 from fem_needle.ledger import StepEnd
 from fem_needle.march import started
@@ -17,7 +18,6 @@ from fem_needle.plant import Plant
 from fem_needle.pushed_march import STEPS_PER_PERIOD, PushMarching, run_limits, started_push
 from fem_needle.pushing import Pusher
 from fem_needle.samples import Sample
-from fem_needle.scene import Scene
 from fem_needle.segments import interfaces
 from fem_needle.steppers import DynamicStepper, Stepper
 
@@ -41,6 +41,10 @@ class Engine(Protocol):
         """Insertion speed [m/s]."""
 
     @property
+    def tip_deflection(self) -> float:
+        """Lateral displacement of the tip [m]."""
+
+    @property
     def end(self) -> StepEnd:
         """The lateral state."""
 
@@ -60,16 +64,8 @@ class Engine(Protocol):
     def sample(self) -> Sample:
         """Return everything that is known of the present instant."""
 
-
-class Driven:
-    """A plant in a scene whose inputs are commanded; everything else is the plant's own."""
-
-    def __init__(self, plant: Plant, scene: Scene) -> None:
-        self._plant = plant
-        self.scene = scene
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._plant, name)
+    def sample_later(self) -> Callable[[], Sample]:
+        """Return what gives that sample, also after the needle has gone on."""
 
 
 def engine_of(plant: Plant, stepper: Stepper, time_step: float) -> Engine:
@@ -110,6 +106,14 @@ class _Kinks:
         return float(self._times[np.searchsorted(self._times, time, side="right")])
 
 
+def _already(sample: Sample) -> Callable[[], Sample]:
+    return lambda: sample
+
+
+def _tip(end: StepEnd) -> float:
+    return float(end.stage.points.deflections(end.solution.coordinates, end.solution.forces)[-1])
+
+
 class PositionEngine:
     """A needle whose depth is prescribed, or follows a commanded speed."""
 
@@ -143,6 +147,11 @@ class PositionEngine:
         return self.end.stage.instant.speed
 
     @property
+    def tip_deflection(self) -> float:
+        """Lateral displacement of the tip [m]."""
+        return _tip(self.end)
+
+    @property
     def end(self) -> StepEnd:
         """The lateral state."""
         return self._march.state
@@ -155,6 +164,10 @@ class PositionEngine:
     def sample(self) -> Sample:
         """Return everything that is known of the present instant."""
         return self._first if self._march.last is None else self._march.sample()
+
+    def sample_later(self) -> Callable[[], Sample]:
+        """Return what gives the sample of this instant."""
+        return _already(self.sample())
 
     def command(self, inputs: Inputs) -> None:
         """Take inputs from now on."""
@@ -271,6 +284,11 @@ class PushEngine:
         return self._march.state.speed
 
     @property
+    def tip_deflection(self) -> float:
+        """Lateral displacement of the tip [m]."""
+        return _tip(self.end)
+
+    @property
     def end(self) -> StepEnd:
         """The lateral state."""
         return self._march.state.end
@@ -283,6 +301,10 @@ class PushEngine:
     def sample(self) -> Sample:
         """Return everything that is known of the present instant."""
         return self._march.sample() if self._march.steps else self._first
+
+    def sample_later(self) -> Callable[[], Sample]:
+        """Return what gives the sample of this instant."""
+        return _already(self.sample())
 
     def command(self, inputs: Inputs) -> None:
         """Take inputs from now on."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import copysign, inf, isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
+from fem_needle.control.signals import own_value
 from fem_needle.errors import SceneError
-from fem_needle.scene import Actuator, LateralLoad, Scene, Table, TipLoad, as_function
+from fem_needle.plant import Plant
+from fem_needle.scene import Actuator, LateralLoad, Scene, Table, TipLoad
 from fem_needle.scene.cross_checks import input_obstacle
 from fem_needle.scene.steering import INPUT_UNITS
 from fem_needle.scene.time_quantity import TimeValue
@@ -16,8 +18,7 @@ from fem_needle.scene.time_quantity import TimeValue
 FREE = Actuator()
 
 
-@dataclass(frozen=True)
-class Ramp:
+class Ramp(NamedTuple):
     """An input that goes from a value to a target at a limited rate and stays there.
 
     Attributes
@@ -57,6 +58,17 @@ class Ramp:
         return Table(time=(self.time, self.arrival), value=(self.start, self.target))
 
 
+class Driven:
+    """A plant in a scene whose inputs are commanded; everything else is the plant's own."""
+
+    def __init__(self, plant: Plant, scene: Scene) -> None:
+        self._plant = plant
+        self.scene = scene
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._plant, name)
+
+
 @dataclass(frozen=True)
 class Inputs:
     """The inputs of a scene that were commanded; the others are the scene's own.
@@ -80,9 +92,9 @@ class Inputs:
         SceneError
             If the scene has no such input, or the command is not finite.
         """
-        changed = dict(self.ramps)
+        changed: dict[str, Ramp] = {}
         for name, wanted in command.items():
-            known = changed.get(name)
+            known = self.ramps.get(name)
             if known is None:
                 _check_input(self.scene, name)
             if not isfinite(wanted):
@@ -90,12 +102,16 @@ class Inputs:
             target = limited(self.scene, name, float(wanted))
             if known is None or known.target != target:
                 changed[name] = Ramp(time, self.value(name, time), target, _rate(self.scene, name))
-        return self if changed == self.ramps else Inputs(self.scene, changed)
+        return Inputs(self.scene, {**self.ramps, **changed}) if changed else self
 
     def value(self, name: str, time: float) -> float:
         """Return an input [SI] at a time [s], from the right; the scene's own where it was never commanded."""
         ramp = self.ramps.get(name)
         return own_value(self.scene, name, time) if ramp is None else ramp.value(time)
+
+    def own_value(self, name: str, time: float) -> float:
+        """Return what the scene itself says of an input [SI] at a time [s]."""
+        return own_value(self.scene, name, time)
 
     def next_kink(self, time: float) -> float:
         """Return when the next ramp after a time arrives [s]; infinity where none is under way."""
@@ -126,18 +142,6 @@ def limited(scene: Scene, name: str, wanted: float) -> float:
 def _rate(scene: Scene, name: str) -> float:
     actuator = getattr(scene.actuators, name) or FREE
     return inf if actuator.rate is None else actuator.rate
-
-
-def own_value(scene: Scene, name: str, time: float) -> float:
-    """Return what the scene itself says of an input [SI] at a time [s]."""
-    sources: dict[str, Any] = {
-        "push_force": scene.insertion.push_force,
-        "speed": scene.insertion.speed,
-        "lateral_force": next((load.force for load in scene.loads if isinstance(load, LateralLoad)), None),
-        "tip_direction": next((load.direction for load in scene.loads if isinstance(load, TipLoad)), None),
-    }
-    found = sources[name] if name in sources else getattr(scene.support, name)
-    return float(as_function(0.0 if found is None else found).value(time))
 
 
 def with_inputs(scene: Scene, functions: Mapping[str, TimeValue]) -> Scene:

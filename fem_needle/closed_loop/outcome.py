@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf
 from typing import Any
 
-from fem_needle.closed_loop.inputs import Ramp
+from fem_needle.closed_loop.inputs import Inputs, Ramp
 from fem_needle.scene import Scene
 
 SAME_DEPTH = 1e-12  # of the needle's length
@@ -71,16 +71,53 @@ class Effort:
 
     def after(self, ramp: Ramp, start: float, end: float) -> Effort:
         """Return the effort after an input has acted from one time to another [s]."""
-        values = abs(ramp.value(start)), abs(ramp.value(end))
-        return replace(
-            self,
-            integral=self.integral + magnitude_integral(ramp, start, end),
-            largest=max(self.largest, *values),
-        )
+        largest = max(self.largest, abs(ramp.value(start)), abs(ramp.value(end)))
+        return Effort(self.integral + magnitude_integral(ramp, start, end), largest)
+
+
+class Account:
+    """Arrival and efforts of a run under way; what is asked at every decision is kept cheap.
+
+    Attributes
+    ----------
+    awaits
+        Depth [m] of the target that the tip has not reached yet; 0 where there is none.
+    """
+
+    def __init__(self, scene: Scene, depth: float, tip_deflection: float) -> None:
+        self._scene, self._efforts = scene, dict[str, Effort]()
+        self._arrival = first_arrival(scene, depth, tip_deflection)
+        self._last, self._closed = (0.0, depth, tip_deflection), 0.0
+        target = scene.target.depth
+        self.awaits = 0.0 if target is None or self._arrival.reached else target
+        self._slack = SAME_DEPTH * scene.needle.length
+
+    def follow(self, time: float, depth: float, tip_deflection: float) -> None:
+        """Note where the tip is."""
+        if self.awaits and depth >= self.awaits - self._slack:
+            before = Arrival(*self._last, False)
+            self._arrival = before.followed(self._scene, time, depth, tip_deflection)
+            self.awaits = 0.0
+        self._last = (time, depth, tip_deflection)
+
+    def close(self, time: float, inputs: Inputs) -> None:
+        """Add what the inputs have done since they were commanded, before they change at a time [s]."""
+        for name, ramp in inputs.ramps.items():
+            self._efforts[name] = self._efforts.get(name, Effort()).after(ramp, self._closed, time)
+        self._closed = time
+
+    def closed(self, time: float, inputs: Inputs) -> tuple[Arrival, dict[str, Effort]]:
+        """Return the arrival, or the present state where the target is not reached, and the efforts up to a time [s]."""
+        self.close(time, inputs)
+        no_target = self._scene.target.depth is None
+        arrival = Arrival(*self._last, no_target) if self.awaits or no_target else self._arrival
+        return arrival, dict(self._efforts)
 
 
 def magnitude_integral(ramp: Ramp, start: float, end: float) -> float:
     """Return the integral of the magnitude of an input over time, exactly."""
+    if start >= ramp.arrival:
+        return abs(ramp.target) * (end - start)
     slope = ramp.slope(ramp.time)
     zero = ramp.time - ramp.start / slope if slope else inf
     marks = [start, *sorted(mark for mark in (zero, ramp.arrival) if start < mark < end), end]

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import cached_property
-from typing import Any, Literal
+from math import atan2
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.choices import first_time_step
-from fem_needle.closed_loop.engine import SAME_TIME, engine_of
-from fem_needle.closed_loop.inputs import Inputs, own_value
-from fem_needle.closed_loop.outcome import Effort, first_arrival, outcome
+from fem_needle.closed_loop.engine import SAME_TIME, Engine, engine_of
+from fem_needle.closed_loop.inputs import Inputs
+from fem_needle.closed_loop.outcome import Account, outcome
+from fem_needle.closed_loop.response_engine import ResponseEngine, why_no_response
 from fem_needle.closed_loop.truth import State
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.motion import run_duration
@@ -24,11 +26,12 @@ from fem_needle.samples import Sample
 from fem_needle.scene import Scene
 from fem_needle.sensing.rig import SensorRig
 from fem_needle.skipping import Skipped, unneeded_terms
+from fem_needle.steppers import StaticStepper
 from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
 
 Array = NDArray[np.float64]
 Reading = float | Array
-Row = tuple[Sample, dict[str, Reading]]
+Row = tuple[Callable[[], Sample], float, dict[str, Reading]]  # what gives the sample, its time, commands and measurements
 
 OUTPUTS = 200
 LARGEST_DEFLECTION = 0.5  # of the needle's length: beyond it a loop is called unstable
@@ -53,6 +56,9 @@ class Simulation:
         Time between the samples of `trajectory` [s]; default: the scene's, and a 200th of the run where that says "auto".
     repetition
         Which of several runs of the same scene it is: the sensors' noise differs.
+    energies
+        Whether `trajectory` shall have works and the energy balance (else nan). Without them a needle without inertia and
+        viscosity, on a prescribed way and under steady loads, is known by its gains: decisions then cost microseconds.
 
     Raises
     ------
@@ -73,6 +79,7 @@ class Simulation:
         analysis: str | None = None,
         output_step: float | None = None,
         repetition: int = 0,
+        energies: bool = True,
     ) -> None:
         given = {"time_step": time_step, "analysis": analysis, "output_step": output_step}
         scene = plant.scene.with_values({f"numerics.{key}": value for key, value in given.items() if value is not None})
@@ -81,14 +88,19 @@ class Simulation:
         self._output_step = output_step_of(scene)
         step = scene.numerics.time_step
         self.time_step = step if isinstance(step, float) else first_time_step(plant, self.analysis, self._output_step)
-        self._engine = engine_of(plant, time_stepper(plant, scene, self.analysis), self.time_step)
+        stepper = time_stepper(plant, scene, self.analysis)
+        self._engine: Engine = engine_of(plant, stepper, self.time_step)
+        if not energies and isinstance(stepper, StaticStepper) and not why_no_response(scene, stepper):
+            self._engine = ResponseEngine(plant, stepper)
+        self._state = State(plant, self._engine)
         self._rig = SensorRig(scene, scene.run.seed, repetition)
         self._inputs, self._commands = Inputs(scene), _commanded_names(scene)
+        self._has_sensors = bool(scene.sensors)
         self._rows: list[Row] = []
         self.stop_reason: str | None = None
-        self._arrival = first_arrival(scene, self.depth, self.tip_deflection)
-        self._efforts: dict[str, Effort] = {}
-        self._rig.sample(self._truth())
+        self._account = Account(scene, self.depth, self.tip_deflection)
+        self._bound = LARGEST_DEFLECTION * scene.needle.length
+        self._rig.sample(self._state)
         self._rows.append(self._row())
 
     @property
@@ -104,7 +116,7 @@ class Simulation:
     @property
     def tip_deflection(self) -> float:
         """Lateral displacement of the tip [m], the true one."""
-        return self._truth().tip_deflection
+        return self._engine.tip_deflection
 
     @property
     def steps(self) -> int:
@@ -142,12 +154,11 @@ class Simulation:
             raise SceneError(f"duration: out of range (got {duration!r}; allowed above 0 s)")
         if self.stop_reason is not None:
             raise SceneError(f"the run has ended at time {self.time:g} s, depth {self.depth:g} m: {self.stop_reason}")
-        inputs = self._inputs.commanded(self.time, command or {})
-        self._commands |= set(command or ())
-        self._inputs = inputs
-        self._engine.command(inputs)
+        time = self._engine.time
+        if command:
+            self._command(time, command)
         try:
-            self._advance(self.time + duration)
+            self._advance(time + duration)
         except ComputationError as error:
             error.partial = self.trajectory("unstable" if isinstance(error, UnstableLoopError) else "failed")
             raise
@@ -155,18 +166,17 @@ class Simulation:
 
     def measurement(self) -> dict[str, Any]:
         """Return what the sensors tell now; see `step`."""
-        if self.scene.sensors:
-            return dict(self._rig.known(self.time))
-        truth = self._truth()
-        angle = float(np.arctan2(truth.tip_deflection, truth.depth)) if truth.depth else 0.0
-        return {"tip_deflection": truth.tip_deflection, "needle_angle": angle, "depth": truth.depth}
+        if self._has_sensors:
+            return self._rig.known(self._engine.time)
+        tip, depth = self._engine.tip_deflection, self._engine.depth
+        return {"tip_deflection": tip, "needle_angle": atan2(tip, depth) if depth else 0.0, "depth": depth}
 
     def trajectory(self, stop_reason: str | None = None) -> Trajectory:
         """Return the run so far, with commands and measurements at each sample; of an interrupted one up to the last sample."""
         rows = [*self._rows]
-        if stop_reason != "interrupted" and self.time > rows[-1][0].time:
+        if stop_reason != "interrupted" and self.time > rows[-1][1]:
             rows.append(self._row())
-        run = trajectory_from_samples(self.plant, [sample for sample, _ in rows], {}, self.scene)
+        run = trajectory_from_samples(self.plant, [sample() for sample, _, _ in rows], {}, self.scene)
         run.signals.update(self._signal_arrays(rows))
         run.summary.update(
             self.plant.describe()
@@ -177,7 +187,7 @@ class Simulation:
                 "skipped": [asdict(skipped) for skipped in self._skipped],
             }
             | summary_of(run)
-            | outcome(self.scene, self._arrival, self._efforts)
+            | outcome(self.scene, *self._account.closed(self.time, self._inputs))
             | {
                 "error_estimate": None,
                 "warnings": list(self.plant.warnings),
@@ -191,63 +201,69 @@ class Simulation:
     @cached_property
     def _skipped(self) -> tuple[Skipped, ...]:
         asked = () if self.analysis == "dynamic" else (Skipped("inertia", f"analysis = '{self.analysis}' was asked for"),)
+        if isinstance(self._engine, ResponseEngine):
+            asked = (*asked, Skipped("works and the energy balance", "energies = False was asked for"))
         return (*asked, *unneeded_terms(self.scene))
 
-    def _truth(self) -> State:
-        return State(self.plant, self._engine)
+    def _command(self, time: float, command: Mapping[str, float]) -> None:
+        """Let a command act from a time on."""
+        inputs = self._inputs.commanded(time, command)
+        if inputs is not self._inputs:
+            self._account.close(time, self._inputs)
+            self._inputs = inputs
+            self._engine.command(inputs)
+            self._commands |= set(command)
 
     def _advance(self, end: float) -> None:
         """Go to a time, with readings and samples on the way."""
-        while self.stop_reason is None and end - self.time > SAME_TIME * self.time_step:
+        engine, rig, account, same = self._engine, self._rig, self._account, SAME_TIME * self.time_step
+        while self.stop_reason is None and end - engine.time > same:
             following = len(self._rows) * self._output_step
-            until = min(end, self._rig.next_time, following, self._arrival_time())
-            until = end if end - until <= SAME_TIME * self.time_step else until
-            start = self.time
-            self.stop_reason = self._engine.advance(until)
-            self._check_bounds()
-            self._keep_account(start)
-            if self._rig.next_time <= self.time + SAME_TIME * self.time_step:
-                self._rig.sample(self._truth())
-            if following <= self.time + SAME_TIME * self.time_step:
+            until = min(end, rig.next_time, following)
+            if account.awaits:
+                until = min(until, engine.passing_time(account.awaits))
+            self.stop_reason = engine.advance(end if end - until <= same else until)
+            time, tip = engine.time, engine.tip_deflection
+            if not abs(tip) <= self._bound:
+                self._leave(tip)
+            account.follow(time, engine.depth, tip)
+            if rig.next_time <= time + same:
+                rig.sample(self._state)
+            if following <= time + same:
                 self._rows.append(self._row())
 
-    def _arrival_time(self) -> float:
-        """Return when the tip will be at the target's depth [s]; infinity where it has been there, or nobody knows."""
-        target = self.scene.target.depth
-        return np.inf if target is None or self._arrival.reached else self._engine.passing_time(target)
+    def _leave(self, tip: float) -> NoReturn:
+        """Give up a needle whose tip has left all bounds.
 
-    def _keep_account(self, start: float) -> None:
-        truth = self._truth()
-        self._arrival = self._arrival.followed(self.scene, self.time, truth.depth, truth.tip_deflection)
-        for name, ramp in self._inputs.ramps.items():
-            self._efforts[name] = self._efforts.get(name, Effort()).after(ramp, start, self.time)
-
-    def _check_bounds(self) -> None:
-        tip, limit = self._truth().tip_deflection, LARGEST_DEFLECTION * self.scene.needle.length
-        if not abs(tip) <= limit:
-            at = f"at time {self.time:g} s, depth {self.depth:g} m"
-            advice = "use smaller gains, a shorter delay or limits on the actuator; where the tip's response changes its sign, "
-            raise UnstableLoopError(
-                f"the tip has gone to {1e3 * tip:.4g} mm {at}, more than half the needle's length ({1e3 * limit:.4g} mm): the "
-                f"loop is unstable; {advice}schedule = 'model-gain'"
-            )
+        Raises
+        ------
+        UnstableLoopError
+            Always.
+        """
+        at = f"at time {self.time:g} s, depth {self.depth:g} m"
+        advice = "use smaller gains, a shorter delay or limits on the actuator; where the tip's response changes its sign, "
+        raise UnstableLoopError(
+            f"the tip has gone to {1e3 * tip:.4g} mm {at}, more than half the needle's length ({1e3 * self._bound:.4g} mm): the "
+            f"loop is unstable; {advice}schedule = 'model-gain'"
+        )
 
     def _row(self) -> Row:
         """Return what is known of the present instant, with commands and measurements."""
         commands: dict[str, Reading] = {f"command_{name}": self._inputs.value(name, self.time) for name in self._commands}
         known = self._rig.known(self.time)
-        return self._engine.sample(), commands | {f"measurement_{name}": value for name, value in known.items()}
+        measured = {f"measurement_{name}": value for name, value in known.items()}
+        return self._engine.sample_later(), self.time, commands | measured
 
     def _signal_arrays(self, rows: list[Row]) -> dict[str, Array]:
         """Return commands and measurements over the samples; nan, or the scene's own input, where there was none yet."""
         found: dict[str, Array] = {}
         for name in sorted(self._commands):
-            values = [known.get(f"command_{name}", own_value(self.scene, name, sample.time)) for sample, known in rows]
+            values = [known.get(f"command_{name}", self._inputs.own_value(name, time)) for _, time, known in rows]
             found[f"command_{name}"] = np.array(values)
         for sensor in self.scene.sensors:
             for name in sensor.readings:
                 empty = np.full(sensor.stations, np.nan) if name == "needle_shape" else np.nan
-                found[f"measurement_{name}"] = np.array([known.get(f"measurement_{name}", empty) for _, known in rows])
+                found[f"measurement_{name}"] = np.array([known.get(f"measurement_{name}", empty) for _, _, known in rows])
         return found
 
 

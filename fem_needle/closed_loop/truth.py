@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.closed_loop.engine import Engine
 from fem_needle.plant import Plant
-from fem_needle.samples import Sample
 
 Array = NDArray[np.float64]
 
@@ -24,7 +22,7 @@ class State:
     plant
         The model.
     engine
-        The needle under way; its state must not advance while this is in use.
+        The needle under way.
     """
 
     plant: Plant
@@ -45,32 +43,27 @@ class State:
         """Insertion speed [m/s]."""
         return self.engine.speed
 
-    @cached_property
+    @property
     def tip_deflection(self) -> float:
         """Lateral displacement of the tip [m]."""
-        end = self.engine.end
-        return float(end.stage.points.deflections(end.solution.coordinates, end.solution.forces)[-1])
+        return self.engine.tip_deflection
 
     def deflection(self, arc_length: Array) -> Array:
         """Return the deflection [m] at stations from the hub, 0, to the tip, l."""
         solution = self.engine.end.solution
         return self.plant.deflection(solution.coordinates, solution.forces, self.depth, arc_length)
 
-    @cached_property
-    def _sample(self) -> Sample:
-        return self.engine.sample()
-
     @property
     def hub_force(self) -> float:
         """Lateral force of the clamp on the needle [N]."""
-        return self._sample.hub_force
+        return self.engine.sample().hub_force
 
     @property
     def hub_moment(self) -> float:
         """Moment of the clamp on the needle [N m]."""
-        return self._sample.hub_moment
+        return self.engine.sample().hub_moment
 
     @property
     def push_force(self) -> float:
         """Axial force that the insertion needs [N]."""
-        return self._sample.push_force
+        return self.engine.sample().push_force

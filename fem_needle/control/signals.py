@@ -8,7 +8,7 @@ from math import inf
 
 from fem_needle.control.controller import Measurement
 from fem_needle.scene import LateralLoad, Scene, TipLoad, as_function
-from fem_needle.scene.signals import IMAGE_ERROR, InputName
+from fem_needle.scene.signals import IMAGE_ERROR
 
 Reader = Callable[[Measurement], float | None]
 
@@ -31,15 +31,15 @@ def output_reader(output: str) -> Reader:
     return image_error
 
 
-def own_value(scene: Scene, name: InputName) -> float:
-    """Return what the scene itself gives an input that it has, at t = 0, in SI."""
+def own_value(scene: Scene, name: str, time: float = 0.0) -> float:
+    """Return what the scene itself gives an input that it has, at a time [s], in SI."""
     if name == "tip_direction":
         value = next(load.direction for load in scene.loads if isinstance(load, TipLoad))
     elif name == "lateral_force":
         value = next(load.force for load in scene.loads if isinstance(load, LateralLoad))
     else:
         value = getattr(scene.insertion if name in {"push_force", "speed"} else scene.support, name)
-    return as_function(value).value(0.0)
+    return float(as_function(0.0 if value is None else value).value(time))
 
 
 @dataclass(frozen=True)

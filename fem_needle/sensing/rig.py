@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
 from math import inf
 
 import numpy as np
@@ -72,7 +71,7 @@ class SensorRig:
             nearest = min(nearest, channel.due)
         self.next_time = nearest
 
-    def known(self, time: float) -> Mapping[str, float | Array]:
+    def known(self, time: float) -> dict[str, float | Array]:
         """Return the latest readings that have arrived, by name (`fem_needle.scene.signals.READINGS`), SI.
 
         Parameters
@@ -82,7 +81,7 @@ class SensorRig:
 
         Returns
         -------
-        Mapping
+        dict
             A copy; a name is absent before its first reading has arrived.
         """
         for channel in self._delayed:
