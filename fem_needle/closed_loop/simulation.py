@@ -196,6 +196,8 @@ class Simulation:
                 "wall_time": clock.perf_counter() - self._started,
             }
         )
+        if isinstance(self._engine, ResponseEngine):
+            run.summary["relative_energy_residual"] = None
         return run
 
     @cached_property
