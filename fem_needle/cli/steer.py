@@ -64,40 +64,28 @@ def steer(
 
     Example: fem-needle steer steering --sensor tip-imaging:noise=0.2mm,delay=0.1
     """
+    from fem_needle.cli.steer_settings import steered
     from fem_needle.run_target import RunTarget
     from fem_needle.scene_file import load_scene
 
     options = by_path(model=model, modes=modes, variant=variant, basis=basis, static_corrections=static_corrections)
     options |= by_path(elements=elements, time_step=time_step, tolerance=tolerance, analysis=analysis, output_step=output_step)
-    loaded = _changed(load_scene(scene), assignments or [], options, controller, schedule, sensor or [])
-    for_study = repeat is not None
-    folder = out or RUNS / (f"{Path(scene).stem}-{NAME}" if for_study else Path(scene).stem)
-    target = RunTarget(folder, force, numbered=out is None, for_study=for_study)
+    options |= {"controller.schedule": schedule}
+    loaded = steered(load_scene(scene), assignments or (), options, controller, sensor or ())
+    folder = out or RUNS / (Path(scene).stem if repeat is None else f"{Path(scene).stem}-{NAME}")
+    target = RunTarget(folder, force, numbered=out is None, for_study=repeat is not None)
     if repeat is None:
         _steer(loaded, target, vtk=not no_vtk, quiet=as_json)
     else:
         _repeat(loaded, repeat, target, quiet=as_json)
     if explain:
-        from fem_needle.cli.steer_table import EXPLANATION
-
-        explain_rows(EXPLANATION, to_stderr=as_json)
+        _explain(to_stderr=as_json)
 
 
-def _changed(
-    scene: Scene,
-    assignments: list[str],
-    options: dict[str, object],
-    controller: str | None,
-    schedule: str | None,
-    sensors: list[str],
-) -> Scene:
-    """Return a scene with the settings of the command line."""
-    from fem_needle.cli.settings import changed
-    from fem_needle.cli.steer_settings import controller_changes, sensor_changes
+def _explain(*, to_stderr: bool) -> None:
+    from fem_needle.cli.steer_table import EXPLANATION
 
-    removed, replaced = controller_changes(scene.controller, controller)
-    first = removed | sensor_changes(scene, sensors)
-    return changed(scene, assignments, options | replaced | {"controller.schedule": schedule}, first)
+    explain_rows(EXPLANATION, to_stderr=to_stderr)
 
 
 def _steer(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from fem_needle.cli.settings import value_of
+from fem_needle.cli.settings import changed, value_of
 from fem_needle.errors import SceneError
+from fem_needle.scene.steering import VARIANTS
 
 if TYPE_CHECKING:
     from fem_needle.scene import Controller, Scene, Sensor
@@ -14,7 +15,21 @@ if TYPE_CHECKING:
 Changes = dict[str, Any]
 
 
-def controller_changes(controller: Controller, text: str | None) -> tuple[Changes, Changes]:
+def steered(
+    scene: Scene, assignments: Sequence[str], options: Mapping[str, Any], controller: str | None, sensors: Sequence[str]
+) -> Scene:
+    """Return a scene with the settings of the command line: loop, then assignments, then options, as far as they collide.
+
+    Raises
+    ------
+    SceneError
+        If a setting has another form, or the changed scene is impossible.
+    """
+    removed, replaced = _controller_changes(scene.controller, controller)
+    return changed(scene, assignments, dict(options) | replaced, removed | _sensor_changes(scene, sensors))
+
+
+def _controller_changes(controller: Controller, text: str | None) -> tuple[Changes, Changes]:
     """Return what ``--controller KIND[:VARIANT]`` removes from a controller, and what it sets.
 
     Gains, schedule and variant stay with the controller that they were written for; period, input and output are kept.
@@ -29,13 +44,14 @@ def controller_changes(controller: Controller, text: str | None) -> tuple[Change
     kind, colon, variant = (part.strip() for part in text.partition(":"))
     if not kind or (colon and not variant):
         raise SceneError(f"--controller: got {text!r}; allowed KIND or KIND:VARIANT, for example inverse-dynamics:realizable")
-    if kind == controller.kind and (not colon or variant == controller.variant):
+    default = VARIANTS[controller.kind][:1]
+    if kind == controller.kind and (not colon or variant == controller.variant or (not controller.variant and variant in default)):
         return {}, {"controller.kind": kind}
     removed = {f"controller.{key}": None for key in ("variant", "schedule", "gains")}
     return removed, {"controller.kind": kind} | ({"controller.variant": variant} if colon else {})
 
 
-def sensor_changes(scene: Scene, texts: Sequence[str]) -> Changes:
+def _sensor_changes(scene: Scene, texts: Sequence[str]) -> Changes:
     """Return what ``--sensor KIND[:key=value,...]`` changes: keys of the scene's sensor of that kind, or a new sensor.
 
     Raises
