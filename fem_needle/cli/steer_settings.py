@@ -44,8 +44,8 @@ def _controller_changes(controller: Controller, text: str | None) -> tuple[Chang
     kind, colon, variant = (part.strip() for part in text.partition(":"))
     if not kind or (colon and not variant):
         raise SceneError(f"--controller: got {text!r}; allowed KIND or KIND:VARIANT, for example inverse-dynamics:realizable")
-    default = VARIANTS[controller.kind][:1]
-    if kind == controller.kind and (not colon or variant == controller.variant or (not controller.variant and variant in default)):
+    present = VARIANTS[controller.kind][:1] if controller.variant is None else (controller.variant,)
+    if kind == controller.kind and (not colon or variant in present):
         return {}, {"controller.kind": kind}
     removed = {f"controller.{key}": None for key in ("variant", "schedule", "gains")}
     return removed, {"controller.kind": kind} | ({"controller.variant": variant} if colon else {})
