@@ -89,7 +89,7 @@ def _end(until: float, kink: float, time_step: float) -> float:
     return kink if kink <= until + SAME_TIME * time_step else until
 
 
-class _Kinks:
+class Kinks:
     """The times at which the scene itself has a kink, looked up further ahead as the run goes on: it may outlast the scene's."""
 
     def __init__(self, plant: Plant) -> None:
@@ -121,7 +121,7 @@ class PositionEngine:
         scene = plant.scene
         self._base, self._time_step, self._inputs = stepper, time_step, Inputs(scene)
         self._law = depth_law(scene)
-        self._kinks = _Kinks(plant)
+        self._kinks = Kinks(plant)
         self._levels = sorted({*interfaces(scene.tissue.layers), plant.smallest_depth} - {0.0})
         self._limits = run_limits(scene)
         self._march = started(plant, stepper, self._law)
@@ -221,6 +221,8 @@ class PositionEngine:
             return _Segment(stepper, self._law, until)
         ramp = inputs.ramps["speed"]
         levels = [*self._levels, 0.0, self._limits.contact]
+        if scene.tissue.rest_line == "cut-path":  # from there on the needle cuts again
+            levels.append(self._march.deepest)
         if self._limits.final_depth is not None and ramp.target > 0.0:
             levels.append(self._limits.final_depth)
         # At a level, and not a rounding before it, which would be passed again.
@@ -259,7 +261,7 @@ class PushEngine:
         scene = plant.scene
         self._base, self._inputs = stepper, Inputs(scene)
         self._time_step = min(time_step, shortest_period(scene) / STEPS_PER_PERIOD)
-        self._kinks = _Kinks(plant)
+        self._kinks = Kinks(plant)
         self._march: PushMarching = started_push(plant, stepper, self._time_step)
         self._until = 0.0
         trial = replace(self._march)
