@@ -124,7 +124,7 @@ def _draw_tip(panel: Axes, curves: LoopCurves) -> None:
     if curves.seen.size:
         readings = MILLIMETERS * run.signals["measurement_tip_deflection"][curves.seen]
         style: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 5, "color": SEEN, "zorder": 2}
-        panel.plot(along[curves.seen], readings, label="measured, when it is known", **style)
+        panel.plot(along[curves.seen], readings, label="latest measurement", **style)
     _mark_end(panel, along, MILLIMETERS * run.tip_deflection, run)
     if curves.target is not None:
         panel.plot(*curves.target, marker="D", markersize=9, color=WANTED, markeredgecolor=INK, linestyle="none", label="target")
