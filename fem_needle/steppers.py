@@ -188,7 +188,7 @@ class DynamicStepper:
             stage = with_path(self.plant, stage, path, history)
         elif path is not None:
             stage = with_path(self.plant, stage, path)
-        forces = np.concatenate([self._end_reactions(stage, end_coordinates, solutions), case.forces])
+        forces = np.concatenate([self.guide_reactions(stage, end_coordinates, solutions), case.forces])
         end = self._state(stage, end_coordinates, end_momentum, forces, path)
         return Step(self.plant, self.method, length, (start, end), stages, solutions, system)
 
@@ -224,7 +224,7 @@ class DynamicStepper:
             return earlier.case
         return load_case(self.plant.scene, depth, time)
 
-    def _end_reactions(self, stage: Stage, coordinates: Array, solutions: tuple[StageSolution, ...]) -> Array:
+    def guide_reactions(self, stage: Stage, coordinates: Array, solutions: tuple[StageSolution, ...]) -> Array:
         """Return the guides' forces at the end of a step from the deflections there.
 
         N q + B P + compliance R = 0 for all guides together, except those rigid ones at a node, whose B vanishes: the mean over

@@ -26,7 +26,15 @@ SAME_TIME = 1e-9  # of a time step: two instants closer than this are one
 
 
 class Engine(Protocol):
-    """A needle under way."""
+    """A needle under way.
+
+    Attributes
+    ----------
+    has_works
+        Whether its samples know the works since the start.
+    """
+
+    has_works: bool
 
     @property
     def time(self) -> float:
@@ -116,6 +124,8 @@ def _tip(end: StepEnd) -> float:
 
 class PositionEngine:
     """A needle whose depth is prescribed, or follows a commanded speed."""
+
+    has_works = True
 
     def __init__(self, plant: Plant, stepper: Stepper, time_step: float) -> None:
         scene = plant.scene
@@ -256,6 +266,8 @@ class PositionEngine:
 
 class PushEngine:
     """A needle that is pushed by a force."""
+
+    has_works = True
 
     def __init__(self, plant: Plant, stepper: DynamicStepper, time_step: float) -> None:
         scene = plant.scene

@@ -45,11 +45,13 @@ def why_no_response(scene: Scene, stepper: Stepper) -> str:
 class ResponseEngine:
     """A needle whose tip follows from gains; meets `fem_needle.closed_loop.engine.Engine`."""
 
+    has_works = False
+
     def __init__(self, plant: Plant, stepper: StaticStepper) -> None:
         scene = plant.scene
         self._plant, self._base, self._inputs = plant, stepper, Inputs(scene)
         self._law = depth_law(scene)
-        self._depth_at = _depth_function(scene)
+        self._depth_at = depth_function(scene)
         self._first = self._response(scene.controller.input)
         self._others: dict[str, ModelResponse] = {}
         self._input = Ramp(0.0, *(2 * [own_value(scene, self._first.input)]))
@@ -124,7 +126,7 @@ class ResponseEngine:
         return replace(self._base, plant=plant)
 
 
-def _depth_function(scene: Scene) -> Callable[[float], float]:
+def depth_function(scene: Scene) -> Callable[[float], float]:
     """Return z(t) [m], quick for a constant speed."""
     insertion = scene.insertion
     if insertion.kind == "hold":

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import cached_property
 from math import atan2
-from typing import Any, Literal, NoReturn
+from typing import Any, Literal, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from fem_needle.choices import first_time_step
 from fem_needle.closed_loop.engine import SAME_TIME, Engine, engine_of
 from fem_needle.closed_loop.inputs import Inputs
+from fem_needle.closed_loop.lean import lean_engine
 from fem_needle.closed_loop.outcome import Account, outcome
-from fem_needle.closed_loop.response_engine import ResponseEngine, why_no_response
 from fem_needle.closed_loop.truth import State
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.motion import run_duration
@@ -26,15 +26,23 @@ from fem_needle.samples import Sample
 from fem_needle.scene import Scene
 from fem_needle.sensing.rig import SensorRig
 from fem_needle.skipping import Skipped, unneeded_terms
-from fem_needle.steppers import StaticStepper
 from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
 
 Array = NDArray[np.float64]
 Reading = float | Array
-Row = tuple[Callable[[], Sample], float, dict[str, Reading]]  # what gives the sample, its time, commands and measurements
 
 OUTPUTS = 200
+EXPECTED = 200  # decisions that are prepared for
 LARGEST_DEFLECTION = 0.5  # of the needle's length: beyond it a loop is called unstable
+
+
+class Row(NamedTuple):
+    """One sample: what gives it, its time [s], the tip [m], commands and measurements."""
+
+    sample: Callable[[], Sample]
+    time: float
+    tip_deflection: float
+    known: dict[str, Reading]
 
 
 class UnstableLoopError(ComputationError):
@@ -89,9 +97,9 @@ class Simulation:
         step = scene.numerics.time_step
         self.time_step = step if isinstance(step, float) else first_time_step(plant, self.analysis, self._output_step)
         stepper = time_stepper(plant, scene, self.analysis)
-        self._engine: Engine = engine_of(plant, stepper, self.time_step)
-        if not energies and isinstance(stepper, StaticStepper) and not why_no_response(scene, stepper):
-            self._engine = ResponseEngine(plant, stepper)
+        lean = None if energies else lean_engine(plant, stepper, self.time_step, self._upcoming)
+        self._engine: Engine = lean or engine_of(plant, stepper, self.time_step)
+        self._tick = (0.0, self.time_step)  # end and duration of the step that is being taken
         self._state = State(plant, self._engine)
         self._rig = SensorRig(scene, scene.run.seed, repetition)
         self._inputs, self._commands = Inputs(scene), _commanded_names(scene)
@@ -117,6 +125,20 @@ class Simulation:
     def tip_deflection(self) -> float:
         """Lateral displacement of the tip [m], the true one."""
         return self._engine.tip_deflection
+
+    @property
+    def has_works(self) -> bool:
+        """Whether works and the energy balance are computed."""
+        return self._engine.has_works
+
+    @property
+    def sampled_tips(self) -> Array:
+        """Deflections of the tip [m] at the samples so far."""
+        return np.array([row.tip_deflection for row in self._rows])
+
+    def interrupt(self) -> None:
+        """End the run here: the last step may not be whole."""
+        self.stop_reason = "interrupted"
 
     @property
     def steps(self) -> int:
@@ -157,6 +179,7 @@ class Simulation:
         time = self._engine.time
         if command:
             self._command(time, command)
+        self._tick = (time + duration, duration)
         try:
             self._advance(time + duration)
         except ComputationError as error:
@@ -174,9 +197,10 @@ class Simulation:
     def trajectory(self, stop_reason: str | None = None) -> Trajectory:
         """Return the run so far, with commands and measurements at each sample; of an interrupted one up to the last sample."""
         rows = [*self._rows]
-        if stop_reason != "interrupted" and self.time > rows[-1][1]:
+        stop_reason = stop_reason or self.stop_reason
+        if stop_reason != "interrupted" and self.time > rows[-1].time:
             rows.append(self._row())
-        run = trajectory_from_samples(self.plant, [sample() for sample, _, _ in rows], {}, self.scene)
+        run = trajectory_from_samples(self.plant, [row.sample() for row in rows], {}, self.scene)
         run.signals.update(self._signal_arrays(rows))
         run.summary.update(
             self.plant.describe()
@@ -191,19 +215,19 @@ class Simulation:
             | {
                 "error_estimate": None,
                 "warnings": list(self.plant.warnings),
-                "stop_reason": stop_reason or self.stop_reason or "duration",
+                "stop_reason": stop_reason or "duration",
                 "solve_time": clock.perf_counter() - self._started,
                 "wall_time": clock.perf_counter() - self._started,
             }
         )
-        if isinstance(self._engine, ResponseEngine):
+        if not self._engine.has_works:
             run.summary["relative_energy_residual"] = None
         return run
 
     @cached_property
     def _skipped(self) -> tuple[Skipped, ...]:
         asked = () if self.analysis == "dynamic" else (Skipped("inertia", f"analysis = '{self.analysis}' was asked for"),)
-        if isinstance(self._engine, ResponseEngine):
+        if not self._engine.has_works:
             asked = (*asked, Skipped("works and the energy balance", "energies = False was asked for"))
         return (*asked, *unneeded_terms(self.scene))
 
@@ -234,6 +258,16 @@ class Simulation:
             if following <= time + same:
                 self._rows.append(self._row())
 
+    def _upcoming(self, time: float) -> Array:
+        """Return when something will happen after a time [s] if decisions go on as they come now, rising."""
+        end, duration = self._tick
+        ticks = end + duration * np.arange(EXPECTED)
+        periods = [self._output_step, *(sensor.period for sensor in self.scene.sensors)]
+        marks = [ticks, *(np.arange(time // period, ticks[-1] / period) * period for period in periods)]
+        found = np.sort(np.concatenate(marks))
+        found = found[found > time + SAME_TIME * self.time_step]
+        return found[np.append(True, np.diff(found) > SAME_TIME * self.time_step)] if len(found) else found
+
     def _leave(self, tip: float) -> NoReturn:
         """Give up a needle whose tip has left all bounds.
 
@@ -254,18 +288,18 @@ class Simulation:
         commands: dict[str, Reading] = {f"command_{name}": self._inputs.value(name, self.time) for name in self._commands}
         known = self._rig.known(self.time)
         measured = {f"measurement_{name}": value for name, value in known.items()}
-        return self._engine.sample_later(), self.time, commands | measured
+        return Row(self._engine.sample_later(), self.time, self._engine.tip_deflection, commands | measured)
 
     def _signal_arrays(self, rows: list[Row]) -> dict[str, Array]:
         """Return commands and measurements over the samples; nan, or the scene's own input, where there was none yet."""
         found: dict[str, Array] = {}
         for name in sorted(self._commands):
-            values = [known.get(f"command_{name}", self._inputs.own_value(name, time)) for _, time, known in rows]
+            values = [row.known.get(f"command_{name}", self._inputs.own_value(name, row.time)) for row in rows]
             found[f"command_{name}"] = np.array(values)
         for sensor in self.scene.sensors:
             for name in sensor.readings:
                 empty = np.full(sensor.stations, np.nan) if name == "needle_shape" else np.nan
-                found[f"measurement_{name}"] = np.array([known.get(f"measurement_{name}", empty) for _, _, known in rows])
+                found[f"measurement_{name}"] = np.array([row.known.get(f"measurement_{name}", empty) for row in rows])
         return found
 
 

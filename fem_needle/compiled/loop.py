@@ -201,11 +201,13 @@ def _copy(source, target):
 
 
 @njit(**ENTRANCE)
-def run_steps(terms, points, course, scheme, state, kept, work, guides):
-    """Go through all steps; returns how many were done, fewer where the next one's equations have no finite answer.
+def run_steps(begin, stop, terms, points, course, scheme, state, kept, work, guides):
+    """Go through some of the steps; returns ``stop``, or the step whose equations have no finite answer.
 
     Parameters
     ----------
+    begin, stop
+        First step, and the one after the last; the next call goes on where this one stopped.
     terms
         Bases (bases, 2 b + 1, n), their element matrices (bases, elements, m, m), stride; at the nodes (2 steps,): sums, ranges
         (operator and base), range_scale, range_ends, blocks (operator and first coordinate), block; see `_assemble`.
@@ -235,7 +237,7 @@ def run_steps(terms, points, course, scheme, state, kept, work, guides):
     kept_stages, kept_ends = kept
     operators, matrix, known, side, answer, end, stages = work
     clamped, width = end_clamp.shape[1], matrix.shape[1] // 2
-    for step in range(len(lengths)):
+    for step in range(begin, stop):
         length, first = lengths[step], 2 * step
         for index in range(len(answer)):
             answer[index] = 0.0
@@ -260,4 +262,4 @@ def run_steps(terms, points, course, scheme, state, kept, work, guides):
             _copy(stages, kept_stages[target[step]])
             _copy(end, kept_ends[target[step]])
         _copy(end, state)
-    return len(lengths)
+    return stop

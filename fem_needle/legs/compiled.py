@@ -50,7 +50,7 @@ def _computed(plant: Plant, stepper: DynamicStepper, law: DepthLaw, piece: Piece
     state = np.stack([start.solution.coordinates, start.solution.momentum])
     given = arguments(at_nodes(table), course, stepper.method, plant.prescribed, state, inertia=stepper.inertia)
     with announced():
-        done = int(run_steps(*given))
+        done = int(run_steps(0, len(lengths), *given))
     guide_forces = np.zeros((len(lengths), 2, 0)) if given[-1] is None else given[-1][2]
     kept = tuple(part[:done] for part in (*given[5], guide_forces))
     return _leg(plant, stepper, instants.first(3 * done + 1), table, lengths[:done], start, kept), done

@@ -171,7 +171,7 @@ def test_only_what_changes_is_factored_anew(monkeypatch, insertion, factored):
     counted, run = [], compiled.run_steps
 
     def counting(*given):
-        counted.append(int(np.sum(given[2][-1])))
+        counted.append(int(np.sum(given[4][-1])))
         return run(*given)
 
     monkeypatch.setattr(compiled, "run_steps", counting)

@@ -16,6 +16,7 @@ LATE_IMPORTS = {
     ("fem_needle.trajectory", "save"),
     ("fem_needle.trajectory", "load"),
     ("fem_needle.loops", "run_loop"),
+    ("fem_needle.closed_loop.lean", "lean_engine"),
     ("fem_needle.batch.many", "prepared"),
 }
 LATE_PACKAGES = ("fem_needle.cli", "reduced_model.commands")

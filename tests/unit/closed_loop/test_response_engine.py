@@ -53,15 +53,21 @@ def test_tips_and_readings_are_those_of_whole_equilibria(scene, model):
         ({"tissue.layers.0.damping": 10.0}, "viscosity"),
         ({"numerics.analysis": "dynamic"}, "inertia"),
         ({"tissue.stiffness_factor": {"mean": 1.0, "amplitude": 0.1, "frequency": 1.0}}, "vary in time"),
+        ({"controller": {"kind": "none", "input": "speed"}}, "speed"),
     ],
 )
 def test_what_gains_do_not_know(changes, reason):
     scene = SCENE.with_values(changes)
     plant = build_plant(scene)
     assert reason in why_no_response(scene, time_stepper(plant, scene, scene.numerics.analysis))
-    simulation = Simulation(plant, time_step=0.1, energies=False)
-    assert not isinstance(simulation._engine, ResponseEngine)  # the whole needle, then, with its works
+    assert not isinstance(Simulation(plant, time_step=0.1, energies=False)._engine, ResponseEngine)
+
+
+def test_where_nothing_is_quicker_the_works_are_computed():
+    swelling = {"tissue.stiffness_factor": {"mean": 1.0, "amplitude": 0.1, "frequency": 1.0}}
+    simulation = Simulation(build_plant(SCENE.with_values(swelling)), time_step=0.1, energies=False)
     simulation.step({"lateral_force": 0.1}, 0.2)
+    assert simulation.has_works
     assert np.all(np.isfinite(simulation.trajectory().load_work))
 
 
