@@ -45,15 +45,16 @@ def test_the_same_needle(changes):
     whole, quick = both(changes)
     assert whole.has_works and not quick.has_works
     commands = [{"hub_torque": 1e-3 * index} for index in range(5)] if "controller" in changes else COMMANDS
-    scale = 0.0
+    # Where a ramp ends inside prepared steps, the steps before it are not the same ones.
+    scale, bound = 0.0, 1e-6 if "actuators.lateral_force" in changes else 1e-7
     for command in commands:
         read, also = whole.step(command, DURATION), quick.step(command, DURATION)
         scale = max(scale, abs(whole.tip_deflection))
         assert quick.time == pytest.approx(whole.time, abs=1e-15)
-        assert abs(quick.tip_deflection - whole.tip_deflection) < 1e-7 * scale
+        assert abs(quick.tip_deflection - whole.tip_deflection) < bound * scale
         assert also == pytest.approx(read, abs=1e-6)
     first, second = whole.trajectory(), quick.trajectory()
-    np.testing.assert_allclose(second.tip_deflection, first.tip_deflection, rtol=0, atol=1e-7 * scale)
+    np.testing.assert_allclose(second.tip_deflection, first.tip_deflection, rtol=0, atol=bound * scale)
     np.testing.assert_allclose(second.bending_energy, first.bending_energy, rtol=1e-5)
     assert second.hub_force[0] == pytest.approx(first.hub_force[0], rel=1e-9)
     assert np.all(np.isnan(second.load_work))
