@@ -45,7 +45,7 @@ def test_the_same_needle(changes):
     whole, quick = both(changes)
     assert whole.has_works and not quick.has_works
     commands = [{"hub_torque": 1e-3 * index} for index in range(5)] if "controller" in changes else COMMANDS
-    # Where a ramp ends inside prepared steps, the steps before it are not the same ones; the integration's own error is 2e-4 there.
+    # Where a ramp ends inside prepared steps, the steps before it differ; the integration's own error is 2e-4 there.
     scale, bound = 0.0, 3e-5 if "actuators.lateral_force" in changes else 1e-7
     for command in commands:
         read, also = whole.step(command, DURATION), quick.step(command, DURATION)
@@ -55,7 +55,7 @@ def test_the_same_needle(changes):
         assert also == pytest.approx(read, abs=1e-6)
     first, second = whole.trajectory(), quick.trajectory()
     np.testing.assert_allclose(second.tip_deflection, first.tip_deflection, rtol=0, atol=bound * scale)
-    np.testing.assert_allclose(second.bending_energy, first.bending_energy, rtol=1e-5)
+    np.testing.assert_allclose(second.bending_energy, first.bending_energy, rtol=max(1e-5, 10 * bound))
     assert second.hub_force[0] == pytest.approx(first.hub_force[0], rel=1e-9)
     assert np.all(np.isnan(second.load_work))
     assert second.summary["steps"] >= 100
