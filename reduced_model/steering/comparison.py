@@ -134,6 +134,7 @@ def findings() -> tuple[str, ...]:
         1e3 * max(abs(outcome("pid, model gain", name, target).error) for name in conditions(scene_of(target)))
         for target in TARGETS
     ]
+    softer = 1e3 * abs(outcome("proportional, model gain", "k x 0.5", before).error)
     return (
         prose(f"""The tip goes with the finger down to {1e3 * sign_change():.1f} mm and against it beyond. A pid with gains of
             fixed sign ends {_against(plain, none)} at {1e3 * beyond:.0f} mm; with the model's gain at the present depth it ends
@@ -142,6 +143,9 @@ def findings() -> tuple[str, ...]:
             Through the direction of the bevel, whose gain keeps its sign, it ends at {turned.text} mm."""),
         prose(f"""Where the model is wrong by up to 50 %, with delay and with noise, the scheduled pid stays within
             {worst[0]:.2f} mm at {1e3 * before:.0f} mm and {worst[1]:.2f} mm at {1e3 * beyond:.0f} mm."""),
+        prose(f"""Tissue that is softer than believed makes a loop gain too high: the scheduled proportional control, which holds
+            an old image's force until the error has changed, is {softer:.1f} mm off at {1e3 * before:.0f} mm in half the modulus,
+            more than without control."""),
         prose("""Incremental control holds its force while the error hardly changes, so that beyond the sign change it does not
             take back in time what it has pushed, whatever the schedule says."""),
     )

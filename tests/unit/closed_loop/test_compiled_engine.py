@@ -28,6 +28,7 @@ CASES = {
         "support.hub_rotation": "free",
         "support.hub_rotational_inertia": 1e-6,
         "controller": {"kind": "none", "input": "hub_torque"},
+        "scatter.entry_angle": 0.0,
     },
     "modes": {"model.kind": "assumed-modes", "numerics.elements": "auto"},
 }
