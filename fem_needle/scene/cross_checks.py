@@ -154,8 +154,9 @@ def _steering_mistakes(scene: Scene) -> Iterator[Mistake]:
     if scene.target.depth is not None and scene.target.depth > scene.needle.length:
         limits = f"got {scene.target.depth:g}; allowed 0 to {scene.needle.length:g} m"
         yield Mistake("target.depth", f"deeper than the needle is long ({limits})", scene.target.depth)
-    if scene.scatter.entry_angle and scene.support.kind != "hub":
-        yield Mistake("scatter.entry_angle", "needs the support 'hub' (allowed 0)", scene.scatter.entry_angle)
+    angle, obstacle = scene.scatter.entry_angle, input_obstacle(scene, "hub_angle")
+    if angle and obstacle:  # nobody could turn the needle
+        yield Mistake("scatter.entry_angle", f"{obstacle} (got {angle:g}; allowed 0 rad)", angle)
     if scene.controller.feedback:
         yield from _controller_mistakes(scene, names)
 

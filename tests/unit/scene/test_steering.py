@@ -202,9 +202,16 @@ def test_a_loop_under_entry_has_fewer_inputs_and_no_angle_at_the_entry():
     with pytest.raises(SceneError) as caught:
         Scene.from_dict(data | {"controller": PID | {"input": "hub_angle"}, "scatter": {"entry_angle": "1 deg"}})
     assert caught.value.mistakes == (
-        "scatter.entry_angle: needs the support 'hub' (allowed 0)",
+        "scatter.entry_angle: needs the support 'hub' with hub_rotation = 'fixed' (got 0.0174533; allowed 0 rad)",
         "controller.input: 'hub_angle' needs the support 'hub' with hub_rotation = 'fixed'",
     )
+
+
+def test_a_free_hub_has_no_angle_that_repetitions_could_turn():
+    free = hub_scene().to_dict()["support"] | {"hub_rotation": "free", "hub_rotational_inertia": 1e-3, "hub_angle": 0.0}
+    expected = "scatter.entry_angle: needs the support 'hub' with hub_rotation = 'fixed' (got 0.002; allowed 0 rad)"
+    assert mistakes_of(support=free, scatter={"entry_angle": 0.002}) == [expected]
+    assert loop(support=free, scatter={"entry_angle": 0.0, "modulus": 0.1}).scatter.modulus == 0.1
 
 
 def test_texts_with_units_are_si():
