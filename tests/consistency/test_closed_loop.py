@@ -44,28 +44,34 @@ def has(scene, analysis):
     return analysis != "static" or (scene.tissue.rest_line == "straight" and scene.insertion.kind != "force")
 
 
+def speed_of(*case):
+    """Return a case of (name, analysis, model), marked where both models of a costly one need not run each time."""
+    slow = case[2] == "elements" and ("pushed" in case[0] or "path" in case[0])
+    return pytest.param(*case, marks=pytest.mark.slow) if slow else case
+
+
 CASES = [(name, analysis) for name, scene in SCENES.items() for analysis in ANALYSES if has(scene, analysis)]
+QUICK = [speed_of(*case, model) for case in CASES for model in MODELS]
 
 
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("name, analysis", CASES)
+@pytest.mark.parametrize("name, analysis, model", QUICK)
 def test_without_commands_it_is_the_run(name, analysis, model):
     plant = MODELS[model](SCENES[name])
-    expected = simulate(plant, time_step=4e-4, analysis=analysis, output_step=2e-3)
-    found = free_run(plant, DURATION, time_step=4e-4, analysis=analysis)
+    expected = simulate(plant, time_step=5e-4, analysis=analysis, output_step=2e-3)
+    found = free_run(plant, DURATION, time_step=5e-4, analysis=analysis)
     assert found.summary["steps"] == expected.summary["steps"]
     assert {key: value for key, value in largest_differences(found, expected).items() if value > 1e-7} == {}
     assert tip_distance(found, expected) < 1e-10
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", ["modes", pytest.param("elements", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name, analysis", [case for case in CASES if "pushed" not in case[0]])
 def test_ends_of_steps_that_fall_on_nothing(name, analysis, model):
     """More steps than the run has: not farther from it than it is from a run with half its step."""
     plant = MODELS[model](SCENES[name])
-    coarse, fine = (simulate(plant, time_step=step, analysis=analysis, output_step=2e-3) for step in (4e-4, 2e-4))
-    pieces = np.random.default_rng(1).uniform(1e-4, 9e-4, 200)
-    found = free_run(plant, DURATION, time_step=4e-4, analysis=analysis, pieces=pieces)
+    coarse, fine = (simulate(plant, time_step=step, analysis=analysis, output_step=2e-3) for step in (5e-4, 2.5e-4))
+    pieces = np.random.default_rng(1).uniform(1e-4, 1.5e-3, 200)
+    found = free_run(plant, DURATION, time_step=5e-4, analysis=analysis, pieces=pieces)
     assert found.summary["steps"] > coarse.summary["steps"]
     assert tip_distance(found, coarse) <= 1.5 * tip_distance(coarse, fine) + 1e-12
 

@@ -130,11 +130,11 @@ def test_the_critical_gain_is_that_of_the_sampled_loop(model):
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if radius(plant, pid(period, middle)) < 1.0 else (low, middle)
-    below, above = pid(period, 0.97 * low), pid(period, 1.03 * low)
+    below, above = pid(period, 0.95 * low), pid(period, 1.05 * low)
     assert radius(plant, below) < 1.0 < radius(plant, above)
-    tips = observed(plant, below, 400, time_step=period / 10)
+    tips = observed(plant, below, 200, time_step=period / 8)
     assert np.ptp(tips[-40:]) < 0.7 * np.ptp(tips[:40])
-    tips = observed(plant, above, 400, time_step=period / 10)
+    tips = observed(plant, above, 200, time_step=period / 8)
     assert np.ptp(tips[-40:]) > 1.5 * np.ptp(tips[:40])
 
 
