@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from math import copysign, inf, isfinite
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from fem_needle.control.signals import own_value
@@ -69,8 +69,7 @@ class Driven:
         return getattr(self._plant, name)
 
 
-@dataclass(frozen=True)
-class Inputs:
+class Inputs(NamedTuple):
     """The inputs of a scene that were commanded; the others are the scene's own.
 
     Attributes
@@ -82,7 +81,7 @@ class Inputs:
     """
 
     scene: Scene
-    ramps: Mapping[str, Ramp] = field(default_factory=dict)
+    ramps: Mapping[str, Ramp] = MappingProxyType({})
 
     def commanded(self, time: float, command: Mapping[str, float]) -> Inputs:
         """Return the inputs after a command [SI] at a time [s]: cut to the limits, approached at the rate of its actuator.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 from fem_needle.closed_loop.inputs import Inputs, Ramp
 from fem_needle.scene import Scene
@@ -54,8 +54,7 @@ def first_arrival(scene: Scene, depth: float, tip_deflection: float) -> Arrival:
     return start.followed(scene, 0.0, depth, tip_deflection)
 
 
-@dataclass(frozen=True)
-class Effort:
+class Effort(NamedTuple):
     """What an input has done.
 
     Attributes
@@ -71,6 +70,9 @@ class Effort:
 
     def after(self, ramp: Ramp, start: float, end: float) -> Effort:
         """Return the effort after an input has acted from one time to another [s]."""
+        if start >= ramp.arrival:
+            held = abs(ramp.target)
+            return Effort(self.integral + held * (end - start), max(self.largest, held))
         largest = max(self.largest, abs(ramp.value(start)), abs(ramp.value(end)))
         return Effort(self.integral + magnitude_integral(ramp, start, end), largest)
 
@@ -116,8 +118,6 @@ class Account:
 
 def magnitude_integral(ramp: Ramp, start: float, end: float) -> float:
     """Return the integral of the magnitude of an input over time, exactly."""
-    if start >= ramp.arrival:
-        return abs(ramp.target) * (end - start)
     slope = ramp.slope(ramp.time)
     zero = ramp.time - ramp.start / slope if slope else inf
     marks = [start, *sorted(mark for mark in (zero, ramp.arrival) if start < mark < end), end]

@@ -116,7 +116,7 @@ class ResponseEngine:
 
     def _tip(self) -> float:
         depth, inputs, time = self.depth, self._inputs, self.time
-        tip = self._first.rest(depth) + self._first.gain(depth) * self._input.value(time)
+        tip = self._first.output(depth, self._input.value(time))
         for name, response in self._others.items():
             tip += response.gain(depth) * (inputs.value(name, time) - inputs.own_value(name, time))
         return tip

@@ -19,6 +19,7 @@ from fem_needle.closed_loop.lean import lean_engine
 from fem_needle.closed_loop.outcome import Account, outcome
 from fem_needle.closed_loop.truth import State
 from fem_needle.errors import ComputationError, SceneError
+from fem_needle.march import ends_by_itself
 from fem_needle.motion import run_duration
 from fem_needle.plant import Plant
 from fem_needle.run_job import time_stepper
@@ -215,7 +216,7 @@ class Simulation:
             | {
                 "error_estimate": None,
                 "warnings": list(self.plant.warnings),
-                "stop_reason": stop_reason or "duration",
+                "stop_reason": stop_reason or self._usual_end(),
                 "solve_time": clock.perf_counter() - self._started,
                 "wall_time": clock.perf_counter() - self._started,
             }
@@ -223,6 +224,12 @@ class Simulation:
         if not self._engine.has_works:
             run.summary["relative_energy_residual"] = None
         return run
+
+    def _usual_end(self) -> str:
+        """Return why a run ends that nothing has ended before."""
+        rested = self.scene.insertion.rest_time
+        at_rest = "speed" not in self._inputs.ramps and rested is not None and self.time >= rested * (1 - SAME_TIME)
+        return "final-depth" if at_rest and ends_by_itself(self.scene) else "duration"
 
     @cached_property
     def _skipped(self) -> tuple[Skipped, ...]:

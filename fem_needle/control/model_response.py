@@ -92,6 +92,15 @@ class ModelResponse:
     largest_gain: float
     sign_changes: tuple[float, ...]
 
+    def output(self, depth: float, value: float) -> float:
+        """Return y0(z) + g(z) u at a depth [m], in one search: both curves have the same pieces."""
+        gain = self.gain
+        inside = min(max(depth, gain.starts[0]), gain.end)
+        index = bisect_right(gain.starts, inside) - 1
+        way = inside - gain.starts[index]
+        (a, b, c, d), (p, q, r, s) = gain.coefficients[index], self.rest.coefficients[index]
+        return (((p + a * value) * way + q + b * value) * way + r + c * value) * way + s + d * value
+
 
 def depth_range(scene: Scene) -> tuple[float, float]:
     """Return the smallest and the largest depth [m] of a run; of a push without end 2 % before the hub meets something."""
