@@ -29,6 +29,7 @@ Sensors = Annotated[
     list[str] | None,
     typer.Option("--sensor", metavar="KIND[:KEY=VALUE,...]", help="Change a sensor, or add one; may be repeated."),
 ]
+NO_ENERGIES = "Compute no works and no energy balance: decisions are then many times quicker in most loops."
 REPEAT = "Run it N times with other scatter and noise; leaves a study in runs/<name>-steer."
 
 
@@ -56,6 +57,7 @@ def steer(
     analysis: shared.Analysis = None,
     output_step: shared.OutputStep = None,
     assignments: shared.Assignments = None,
+    no_energies: Annotated[bool, typer.Option("--no-energies", help=NO_ENERGIES)] = False,
     no_vtk: shared.NoVtk = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json, or steer.json, and nothing else.")] = False,
     explain: shared.Explain = False,
@@ -75,9 +77,9 @@ def steer(
     folder = out or RUNS / (Path(scene).stem if repeat is None else f"{Path(scene).stem}-{NAME}")
     target = RunTarget(folder, force, numbered=out is None, for_study=repeat is not None)
     if repeat is None:
-        _steer(loaded, target, vtk=not no_vtk, quiet=as_json)
+        _steer(loaded, target, energies=not no_energies, vtk=not no_vtk, quiet=as_json)
     else:
-        _repeat(loaded, repeat, target, quiet=as_json)
+        _repeat(loaded, repeat, target, energies=not no_energies, quiet=as_json)
     if explain:
         _explain(to_stderr=as_json)
 
@@ -88,7 +90,7 @@ def _explain(*, to_stderr: bool) -> None:
     explain_rows(EXPLANATION, to_stderr=to_stderr)
 
 
-def _steer(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool) -> None:
+def _steer(scene: Scene, target: RunTarget, *, energies: bool, vtk: bool, quiet: bool) -> None:
     """Compute, write and show a loop."""
     from fem_needle.cli.run_progress import ProgressBar
     from fem_needle.cli.steer_table import steer_rows
@@ -101,14 +103,14 @@ def _steer(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool) -> None:
     writer = RunFolderWriter(target, vtk=vtk, warnings=messages, others={PICTURE: steer_picture})
     bar = ProgressBar(scene.title)
     progress = (lambda share: None) if quiet else bar.progress
-    run = finished(lambda: compute(scene, progress=progress), writer, bar, quiet=quiet)
+    run = finished(lambda: compute(scene, energies=energies, progress=progress), writer, bar, quiet=quiet)
     if quiet:
         print_json(run.summary)
     else:
         show_rows(scene.title, steer_rows(run, shown_folder(writer), messages))
 
 
-def _repeat(scene: Scene, repetitions: int, target: RunTarget, *, quiet: bool) -> None:
+def _repeat(scene: Scene, repetitions: int, target: RunTarget, *, energies: bool, quiet: bool) -> None:
     """Compute, write and show many runs of a loop."""
     from fem_needle.cli.run_progress import ProgressBar
     from fem_needle.cli.short_path import short_path
@@ -124,7 +126,7 @@ def _repeat(scene: Scene, repetitions: int, target: RunTarget, *, quiet: bool) -
     warned(scene)
     bar = ProgressBar(scene.title)
     try:
-        study = compute(scene, repetitions, progress=None if quiet else bar.progress)
+        study = compute(scene, repetitions, energies=energies, progress=None if quiet else bar.progress)
     finally:
         bar.stop()
     plain = study.to_dict()

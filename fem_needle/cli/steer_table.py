@@ -24,7 +24,10 @@ _OF_A_LOOP = (
     ("tip deflection", "sideways displacement of the tip from the straight axis: the largest magnitude, and that at the end."),
     ("controller", "--controller and --schedule choose; its gains: --set controller.gains.<key>=<value>."),
     ("sensors", "--sensor changes one or adds one."),
-    ("energy residual", "largest gap in the balance of lateral energy and works, each term computed for itself."),
+    (
+        "energy residual",
+        "largest gap in the balance of lateral energy and works, each term computed for itself; --no-energies leaves it out.",
+    ),
     (
         "error estimate",
         "largest change of the tip over the run by its largest deflection when the same commands act with steps of half the "
@@ -46,7 +49,8 @@ def steer_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str]) -> 
     largest, last = (1e3 * summary[key] for key in ("max_abs_tip_deflection", "final_tip_deflection"))
     yield "tip deflection", f"largest {largest:.4g} mm, {last:.4g} mm at the end"
     yield from _loop_rows(run.scene)
-    yield "energy residual", f"{summary['relative_energy_residual']:.1e} of the largest lateral energy"
+    residual = summary["relative_energy_residual"]
+    yield "energy residual", "not computed" if residual is None else f"{residual:.1e} of the largest lateral energy"
     yield from computation_rows(run, folder, known_warnings)
     yield "picture", str(folder / "steer.png")
 

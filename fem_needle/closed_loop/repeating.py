@@ -28,7 +28,14 @@ START = 3.0  # s of work from which on the start of processes pays
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def repeat(scene: Scene, repetitions: int, *, processes: int | None = None, progress: Progress | None = None) -> RepeatedLoop:
+def repeat(
+    scene: Scene,
+    repetitions: int,
+    *,
+    processes: int | None = None,
+    energies: bool = True,
+    progress: Progress | None = None,
+) -> RepeatedLoop:
     """Steer a scene again and again, with other scatter and other noise each time.
 
     Parameters
@@ -39,6 +46,8 @@ def repeat(scene: Scene, repetitions: int, *, processes: int | None = None, prog
         How many; number i is ``steer(scene, repetition=i)``, i = 1, 2, ...
     processes
         How many to use; default: one, and as many as there are cores where the first repetition shows that it pays.
+    energies
+        As for `steer`.
     progress
         Is told which share of all repetitions is done, 0 to 1.
 
@@ -60,7 +69,7 @@ def repeat(scene: Scene, repetitions: int, *, processes: int | None = None, prog
     found: dict[int, Repetition] = {}
     mistakes: dict[int, Mistakes] = {}
     try:
-        for one, wrong in _all(scene, repetitions, processes, progress or _nobody):
+        for one, wrong in _all(partial(one_repetition, scene, energies), repetitions, processes, progress or _nobody):
             found[one.number], mistakes[one.number] = one, wrong
     except KeyboardInterrupt:
         pass  # what was computed is told
@@ -71,22 +80,23 @@ def repeat(scene: Scene, repetitions: int, *, processes: int | None = None, prog
 
 Mistakes = tuple[str, ...]  # in the scene of a repetition
 Answer = tuple[Repetition, Mistakes]
+Compute = Callable[..., Answer]  # `one_repetition` of a scene
 
 
 def _nobody(fraction: float) -> None:
     """Tell nobody."""
 
 
-def _all(scene: Scene, repetitions: int, processes: int | None, progress: Progress) -> Iterator[Answer]:
+def _all(compute: Compute, repetitions: int, processes: int | None, progress: Progress) -> Iterator[Answer]:
     """Yield all repetitions, in any order: one after the other, until processes pay; up to one that was interrupted."""
     workers, started = (os.cpu_count() or 1) if processes is None else processes, perf_counter()
     for number in range(1, repetitions + 1):
         left, spent = repetitions - number + 1, perf_counter() - started
         pays = processes is not None or (number > 1 and spent / (number - 1) * left > START)
         if workers > 1 and left > 1 and pays:
-            yield from _in_processes(scene, range(number, repetitions + 1), workers, progress)
+            yield from _in_processes(compute, range(number, repetitions + 1), workers, progress)
             return
-        answer = one_repetition(scene, number, partial(_tell_share, progress, number, repetitions))
+        answer = compute(number, partial(_tell_share, progress, number, repetitions))
         yield answer
         if answer[0].stop_reason == "interrupted":
             return
@@ -97,10 +107,10 @@ def _tell_share(progress: Progress, number: int, repetitions: int, share: float)
     progress((number - 1 + share) / repetitions)
 
 
-def one_repetition(scene: Scene, number: int, progress: Progress = _nobody) -> Answer:
+def one_repetition(scene: Scene, energies: bool, number: int, progress: Progress = _nobody) -> Answer:
     """Return a repetition, whatever becomes of it, and what is wrong with its scene."""
     try:
-        return _row(scene, number, steer(scene, repetition=number, progress=progress)), ()
+        return _row(scene, number, steer(scene, repetition=number, energies=energies, progress=progress)), ()
     except KeyboardInterrupt:
         return Repetition(number, drawn(scene, number), {"stop_reason": "interrupted"}), ()
     except NeedleError as error:
@@ -114,17 +124,17 @@ def _row(scene: Scene, number: int, run: Trajectory, failure: str | None = None)
     return Repetition(number, drawn(scene, number), run.summary, failure, run.time, run.depth, run.tip_deflection)
 
 
-def _in_processes(scene: Scene, numbers: range, workers: int, progress: Progress) -> Iterator[Answer]:
+def _in_processes(compute: Compute, numbers: range, workers: int, progress: Progress) -> Iterator[Answer]:
     """Yield repetitions as they come; each process has one at a time, so that an interrupt leaves none in a queue."""
     waiting: set[Future[Answer]] = set()
     left, done = iter(numbers), numbers.start - 1
     # Not forked: the caller may have threads.
     with _single_threads(), ProcessPoolExecutor(workers, get_context("spawn"), initializer=_prepare) as pool:
         try:
-            waiting |= {pool.submit(_in_process, scene, number) for number in islice(left, workers)}
+            waiting |= {pool.submit(_in_process, compute, number) for number in islice(left, workers)}
             while waiting:
                 finished, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                waiting |= {pool.submit(_in_process, scene, number) for number in islice(left, len(finished))}
+                waiting |= {pool.submit(_in_process, compute, number) for number in islice(left, len(finished))}
                 done += len(finished)
                 yield from (one.result() for one in finished)
                 progress(done / numbers[-1])
@@ -155,10 +165,10 @@ def _prepare() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _in_process(scene: Scene, number: int) -> Answer:
+def _in_process(compute: Compute, number: int) -> Answer:
     """Compute a repetition that an interrupt ends early."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        return one_repetition(scene, number)
+        return compute(number)
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
