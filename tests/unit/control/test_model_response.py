@@ -50,6 +50,12 @@ def test_a_direction_scales_the_tip_forces_whatever_direction_they_have():
             assert found.rest(depth) + found.gain(depth) * direction == pytest.approx(tip, abs=1e-5 * 1e-3)
 
 
+def test_the_output_is_rest_and_gain_times_input():
+    response = model_response(build_plant(tube(loads=BEVEL)), "lateral_force", depths=(0.02, 0.14))
+    for depth, value in ((0.02, 0.3), (0.0777, -1.2), (0.14, 2.0), (0.5, 1.0)):
+        assert response.output(depth, value) == pytest.approx(response.rest(depth) + response.gain(depth) * value, rel=1e-13)
+
+
 def test_half_of_it_is_the_image_error():
     plant = build_plant(tube(loads=BEVEL))
     whole, half = (model_response(plant, "lateral_force", depths=(0.05, 0.12), share=share) for share in (1.0, 0.5))
