@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fem_needle import FiniteElementNeedle
-from fem_needle.scene import Guide, LateralLoad, Layer, TipLoad
+from fem_needle import FiniteElementNeedle, simulate
+from fem_needle.scene import Guide, Insertion, LateralLoad, Layer, TipLoad
 from reduced_model import AssumedModeNeedle
 from tests.consistency.closed_loop_scenes import INPUTS, MODELS, commanded, loop_scene, scene_for
-from tests.consistency.scenes import moving
+from tests.consistency.scenes import DAMPED, moving
 
 CREEPING = (Layer(start=0.0, foundation_modulus=5e3, damping=50.0),)
 END = 0.04
@@ -66,3 +66,13 @@ def test_creep_after_a_jump_is_resolved_as_the_continuum_allows(name, power):
     loads = [TipLoad(force=0.1), LateralLoad(position=-0.005, force=0.0)]
     plant = FiniteElementNeedle(loop_scene(layers=CREEPING, loads=loads, duration=END), elements=12)
     assert order(plant, name, "quasi-static", 5e-4)[0] == pytest.approx(power, abs=0.1)
+
+
+@pytest.mark.parametrize("push", [0.5, 0.7, 0.9, 1.1])
+def test_a_creeping_push_over_an_interface(push):
+    """A step that ends there ends in the layer behind: not a node, with a quarter of the step's weight, in the one ahead."""
+    insertion = Insertion(kind="force", initial_depth=0.06, push_force=push)
+    plant = MODELS["modes"](loop_scene(insertion, kind="entry", layers=DAMPED, duration=0.018))
+    run = simulate(plant, time_step=2e-4, analysis="quasi-static", output_step=2e-3)
+    first = int(np.searchsorted(run.depth, 0.08))
+    assert np.max(np.abs(run.energy_residual[first - 1 : first + 1])) < 1e-4 * run.tissue_energy[first - 1]
