@@ -80,6 +80,8 @@ def _run(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool) -> None:
     from fem_needle.simulation import run_scene
 
     messages = warned(scene)
+    if scene.controller.kind != "none":
+        typer.echo("note: the scene's controller does not act here; 'fem-needle steer' closes its loop", err=True)
     writer, bar = RunFolderWriter(target, vtk=vtk, warnings=messages), ProgressBar(scene.title)
     observer = writer if quiet else Observers(bar, writer)
     done = finished(lambda: run_scene(scene, observer=observer), writer, bar, quiet=quiet)

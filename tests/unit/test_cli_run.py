@@ -60,6 +60,13 @@ def test_json_is_the_summary_and_nothing_else(run, tmp_path):
     assert {"elements", "time_step", "steps", "error_estimate", "skipped", "warnings", "wall_time", "solve_time"} <= set(summary)
 
 
+def test_a_run_says_that_a_controller_does_not_act(run):
+    status, out, err = run("run", "steering", "--elements", "2", "--output-step", "1", "--no-vtk", "--json")
+    assert status == 0
+    assert "'fem-needle steer' closes its loop" in err
+    assert "controller" not in json.loads(out)
+
+
 def test_options_end_up_in_the_scene_of_the_folder(run, tmp_path):
     options = ("--model", "fem", "--degree", "3", "--time-step", "250 ms", "--tolerance", "1e-2", "--analysis", "static")
     layer = ("--set", "tissue.layers.phantom.foundation_modulus=1 kN/m^2", "--set", "loads.0.force=0.2")
