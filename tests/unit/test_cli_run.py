@@ -61,7 +61,7 @@ def test_json_is_the_summary_and_nothing_else(run, tmp_path):
 
 
 def test_a_run_says_that_a_controller_does_not_act(run):
-    status, out, err = run("run", "steering", "--elements", "2", "--output-step", "1", "--no-vtk", "--json")
+    status, out, err = run("steering", "--elements", "2", "--output-step", "1", "--no-vtk", "--json")
     assert status == 0
     assert "'fem-needle steer' closes its loop" in err
     assert "controller" not in json.loads(out)
