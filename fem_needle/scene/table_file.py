@@ -43,7 +43,7 @@ def read_table(file: str, column: str, folder: Path | None) -> dict[str, Any]:
         raise ValueError(f"{file!r} is no CSV: {error}") from None
     if len(rows) < 3:
         raise ValueError(f"{file!r} needs a header and at least two rows")
-    header = [_column(cell) for cell in rows[0]]
+    header = [split_header(cell) for cell in rows[0]]
     names = [name for name, _ in header]
     for wanted in ("time", column):
         if names.count(wanted) != 1:
@@ -52,10 +52,10 @@ def read_table(file: str, column: str, folder: Path | None) -> dict[str, Any]:
     time_unit = units.parse_unit(written)
     if time_unit.dimension != units.parse_unit("s").dimension:
         raise ValueError(f"{file!r} has times in {written!r} (allowed a time, as s)")
-    times = _numbers(rows, names.index("time"), file)
+    times = column_numbers(rows, names.index("time"), file)
     result: dict[str, Any] = {
         "time": [time_unit.to_si(time) for time in times],
-        "value": _numbers(rows, names.index(column), file),
+        "value": column_numbers(rows, names.index(column), file),
     }
     unit = header[names.index(column)][1]
     return result if unit is None else result | {"unit": unit}
@@ -105,12 +105,20 @@ def inside_folder(file: str, folder: Path | None) -> Path:
     return path
 
 
-def _column(cell: str) -> tuple[str, str | None]:
+def split_header(cell: str) -> tuple[str, str | None]:
+    """Return name and unit of a column from its header; None without brackets."""
     match = _HEADER.fullmatch(cell)
     return (match[1], match[2]) if match else (cell.strip(), None)
 
 
-def _numbers(rows: list[list[str]], index: int, file: str) -> list[float]:
+def column_numbers(rows: list[list[str]], index: int, file: str) -> list[float]:
+    """Return the numbers of a column below the header.
+
+    Raises
+    ------
+    ValueError
+        If a cell is missing or no number; says where.
+    """
     numbers = []
     for line, row in enumerate(rows[1:], start=2):
         try:

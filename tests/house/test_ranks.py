@@ -96,6 +96,7 @@ RANKS = {
     "pictures": 0,
     "study_files": 4,
     "closed_loop": 18,
+    "identification": 19,
     "cli": 20,
     "__main__": 21,
 }
