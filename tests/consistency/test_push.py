@@ -279,7 +279,7 @@ def test_the_thesis_tip_and_its_ledger(kinematics, largest):
         ("hub", {}),
         ("entry", {}),
         ("entry", {"model": Model(kinematics="fixed-frame")}),
-        ("hub", {"tissue": {"rest_line": "cut-path"}}),
+        pytest.param("hub", {"tissue": {"rest_line": "cut-path"}}, marks=pytest.mark.slow),
     ],
 )
 def test_both_ledgers_of_a_needle_pushed_through_layers(kind, parts):

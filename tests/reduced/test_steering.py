@@ -53,6 +53,7 @@ def test_repetitions_differ_and_are_the_same_again():
     np.testing.assert_array_equal(table_iv.insertions(scene, repetitions=2).errors, errors)
 
 
+@pytest.mark.slow
 def test_a_wrong_model_is_the_needle_s_not_the_controller_s():
     believed, softer = (comparison.outcome("none", name, 0.06) for name in ("as believed", "k x 0.5"))
     assert abs(softer.error) > 1.3 * abs(believed.error)  # the bevel's force stays, the tissue gives way

@@ -82,7 +82,7 @@ def test_a_loop_shows_a_table_and_leaves_a_folder(run, scene):
     summary, rows = load_run(folder).summary, rows_of(out)
     for name in ("target_error", "target_time", "target_reached", "effort", "largest_command", "controller", "sensors", "steps"):
         assert summary[name] == expected[name]
-    assert rows["target error"] == [f"{1e3 * expected['target_error']:.4g} mm at 0.8 s, depth 58 mm (duration)"]
+    assert rows["target error"] == [f"{1e3 * expected['target_error']:.4g} mm at 0.8 s, depth 58 mm (final-depth)"]
     largest, effort = expected["largest_command"]["lateral_force"], expected["effort"]["lateral_force"]
     assert rows["command"] == [f"lateral force: largest {largest:.4g} N, integral {effort:.4g} N s"]
     assert rows["controller"] == ["pid, model-gain; lateral_force from tip_deflection every 100 ms"]
@@ -292,7 +292,7 @@ def test_a_repetition_that_fails_does_not_end_the_others(run):
     rows = json.loads(Path("runs/short-steer/steer.json").read_text(encoding="utf-8"))["rows"]
     stiff = [row["modulus_factor"] > 10.0 for row in rows]  # at 2e3 N/m a tip in softer tissue moves too far
     assert 0 < sum(stiff) < 5
-    assert [row["stop_reason"] == "duration" for row in rows] == stiff
+    assert [row["stop_reason"] == "final-depth" for row in rows] == stiff
     assert [row["target_error"] is not None for row in rows] == stiff
     assert all("unstable" in row["failure"] for row, good in zip(rows, stiff, strict=True) if not good)
     shown = rows_of(out)
@@ -323,7 +323,7 @@ def test_an_interrupt_keeps_the_repetitions_that_are_done(run, monkeypatch):
     assert status == 1
     assert "interrupted after 1 of 3 repetitions" in err
     rows = json.loads(Path("runs/short-steer/steer.json").read_text(encoding="utf-8"))["rows"]
-    assert [row["stop_reason"] for row in rows] == ["duration", "interrupted"]
+    assert [row["stop_reason"] for row in rows] == ["final-depth", "interrupted"]
 
 
 def test_runs_and_studies_do_not_replace_each_other(run, command_line):
