@@ -65,6 +65,12 @@ def test_the_examples_of_the_readme_run(example, tmp_path, monkeypatch, capsys):
     assert (tmp_path / "my-run" / "series.nc").exists() == ("my-run" in example)
 
 
+def test_the_example_of_the_page_on_control_runs(capsys):
+    [example] = blocks((ROOT / "docs" / "control.md").read_text(encoding="utf-8"), "python")
+    exec(compile(example, "control.md", "exec"), {})
+    assert "mm with" in capsys.readouterr().out
+
+
 def test_the_readme_lists_every_shipped_scene():
     assert {name for name in shipped_names() if f"`{name}`" not in README} == set()
 
