@@ -23,7 +23,7 @@ from fem_needle.errors import SceneError
 Array = NDArray[np.float64]
 
 CONFIDENCE = 0.95
-SMALLEST_SINGULAR_VALUE = 1e-10  # of the largest, columns scaled to length 1: below it data do not tell parameters apart
+SMALLEST_SINGULAR_VALUE = 1.5e-8  # of the largest, columns scaled to length 1; its square, in X^T X, would be rounding
 NULL_SHARE = 0.1  # a parameter belongs to the direction that data leave open if its component exceeds this
 FILTER_ORDER = 4
 FEWEST_SAMPLES = 15
