@@ -45,23 +45,44 @@ APPENDIX_B = (
 )
 
 
+class FrictionTable(NamedTuple):
+    """Table I: means and standard deviations over the experiments, mu_s [N] and mu_v [N s/m]; no unit is printed."""
+
+    coulomb: float
+    viscous: float
+    coulomb_deviation: float
+    viscous_deviation: float
+
+
+TABLE_I = FrictionTable(0.56, 0.3, 0.0374, 0.0447)
+FRICTION_REPETITIONS = 20
+
+
 class TissueTest(NamedTuple):
-    """A column of Table II: means of the stiffness matrix [N/mm by their size; no unit is printed] under a force [N]."""
+    """A column of Table II: the stiffness matrix [N/mm by its size; no unit is printed] under a force [N].
+
+    Means over places in the tissue, and their standard deviations.
+    """
 
     force: float
     k_xx: float
     k_zz: float
     k_xz: float
     k_zx: float
+    deviation_xx: float
+    deviation_zz: float
+    deviation_xz: float
+    deviation_zx: float
 
 
 TABLE_II = (
-    TissueTest(1.1, 1.26, 1.01, 0.04, -0.10),
-    TissueTest(1.2, 0.82, 0.81, 0.04, -0.10),
-    TissueTest(1.3, 1.10, 0.69, 0.01, -0.11),
-    TissueTest(1.4, 1.03, 0.60, 0.001, -0.11),
-    TissueTest(1.5, 0.96, 0.52, -0.005, -0.11),
+    TissueTest(1.1, 1.26, 1.01, 0.04, -0.10, 0.08, 0.11, 0.08, 0.06),
+    TissueTest(1.2, 0.82, 0.81, 0.04, -0.10, 0.54, 0.15, 0.07, 0.10),
+    TissueTest(1.3, 1.10, 0.69, 0.01, -0.11, 0.11, 0.18, 0.09, 0.09),
+    TissueTest(1.4, 1.03, 0.60, 0.001, -0.11, 0.12, 0.19, 0.08, 0.09),
+    TissueTest(1.5, 0.96, 0.52, -0.005, -0.11, 0.12, 0.18, 0.08, 0.09),
 )
+TISSUE_REPETITIONS = 20
 
 
 class InsertionTest(NamedTuple):
