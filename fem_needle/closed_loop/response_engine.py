@@ -25,7 +25,7 @@ from fem_needle.motion import depth_law, run_duration
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample, sample_step
 from fem_needle.scene import Scene
-from fem_needle.steppers import StaticStepper, Stepper
+from fem_needle.steppers import StaticStepper, Step, Stepper
 
 MOMENT = 1e-3  # s: the step that a sample is taken from, at its start
 UNKNOWN = Works(*[nan] * len(fields(Works)))
@@ -108,8 +108,10 @@ class ResponseEngine:
         time, depth, deepest, stepper = self.time, self.depth, self.deepest, self._driven()
 
         def computed() -> Sample:
-            start = stepper.start(self._law, time, time, self._before)
-            step = stepper.advance(self._law, start, time + MOMENT, None)
+            start, nodes = stepper.start(self._law, time, time, self._before), len(stepper.method.nodes)
+            # Equilibria have no rates that anything here would ask for: a step that goes nowhere will do.
+            still = (start.stage,) * nodes, (start.solution,) * nodes
+            step = Step(self._plant, stepper.method, MOMENT, (start, start), *still)
             return sample_step(self._plant, step, UNKNOWN, deepest, depth, at_start=True, inertia=False)
 
         return computed
