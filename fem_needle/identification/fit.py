@@ -8,9 +8,8 @@ correlations; intervals are Student's t in the scale of the fit (Draper and Smit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import exp, inf, log
-from typing import Any
 
 import numpy as np
 import scipy  # its parts are loaded where they are used
@@ -20,6 +19,7 @@ from fem_needle.errors import SceneError
 from fem_needle.identification.least_squares import CONFIDENCE, LinearFit, weighted_least_squares
 from fem_needle.identification.measurements import Measurements
 from fem_needle.identification.predictions import Predictor, predictor_of
+from fem_needle.identification.result import Identification, Parameter, Prediction, Whiteness
 from fem_needle.identification.static_model import value_at
 from fem_needle.scene import Scene
 
@@ -28,123 +28,6 @@ Array = NDArray[np.float64]
 SIGNED = ("force", "hub_deflection", "hub_angle")  # last keys of what may be negative
 WORST_CONDITION = 1e7  # of the Jacobian in relative units: beyond it rounding of the model decides
 MOST_LAGS = 10
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A fitted number of a scene.
-
-    Attributes
-    ----------
-    path
-        As for `Scene.with_value`.
-    value, start
-        Fitted, and in the scene before; SI.
-    standard_error
-        SI; of a logarithm times the value.
-    interval
-        95 %; SI.
-    is_log
-        Whether its logarithm was fitted.
-    """
-
-    path: str
-    value: float
-    start: float
-    standard_error: float
-    interval: tuple[float, float]
-    is_log: bool
-
-
-@dataclass(frozen=True)
-class Whiteness:
-    """Whether residuals in the order of the rows look like independent noise.
-
-    Attributes
-    ----------
-    first_correlation
-        Of neighbors, -1 to 1.
-    p_value
-        Of Ljung and Box's test of no correlation up to ``lags``: a small one says that the model misses something.
-    lags
-        How many.
-    """
-
-    first_correlation: float
-    p_value: float
-    lags: int
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """What the fit says of rows that were held back.
-
-    Attributes
-    ----------
-    rows
-        How many.
-    rms, largest
-        Root mean square and largest residual over the standard deviation of a measurement.
-    inside
-        Share inside the 95 % prediction band.
-    """
-
-    rows: int
-    rms: float
-    largest: float
-    inside: float
-
-
-@dataclass(frozen=True, eq=False)
-class Identification:
-    """Result of `identify`.
-
-    Attributes
-    ----------
-    scene
-        With the fitted values.
-    parameters
-        In the order given.
-    measured, fitted
-        All rows that were fitted (n,), SI; every data set's, one after the other.
-    deviations
-        Standard deviation of each row (n,), as given or 1, times ``linear.deviation``.
-    linear
-        The linear fit at the minimum, in the scale of the fit.
-    condition
-        Of the Jacobian in relative units: how much worse the worst combination of parameters is seen than the best.
-    whiteness
-        Of the residuals over their deviations.
-    prediction
-        Of the rows that were held back; None without.
-    evaluations
-        How often the model was asked.
-    """
-
-    scene: Scene
-    parameters: tuple[Parameter, ...]
-    measured: Array
-    fitted: Array
-    deviations: Array
-    linear: LinearFit
-    condition: float
-    whiteness: Whiteness
-    prediction: Prediction | None
-    evaluations: int
-
-    @property
-    def correlation(self) -> Array:
-        """Between the parameters, (p, p)."""
-        return self.linear.correlation
-
-    @property
-    def residuals(self) -> Array:
-        """Measured minus fitted (n,), SI."""
-        return self.measured - self.fitted
-
-    def __getitem__(self, path: str) -> Parameter:
-        """Return a parameter by its path."""
-        return next(one for one in self.parameters if one.path == path)
 
 
 def identify(
@@ -262,57 +145,64 @@ def _to(value: float, is_log: bool) -> float:
     return log(value) if 0.0 < value < inf else (-inf if value <= 0.0 else inf)
 
 
-def _fitted(scene: Scene, predictor: Predictor, scales: _Scales, held: Predictor | None) -> Identification:
-    measured, deviations = predictor.measured, predictor.deviations
-    count = 0
+@dataclass(eq=False)
+class _Asked:
+    """The model in the scale of the fit, in units of the deviations; keeps its last answer."""
 
-    def model(scaled: Array) -> tuple[Array, Array]:
-        nonlocal count
-        count += 1
-        values = scales.values(scaled)
-        answers, slopes = predictor.answers(values)
-        return answers, slopes * scales.slopes(values)
+    predictor: Predictor
+    scales: _Scales
+    count: int = 0
+    known: dict[bytes, tuple[Array, Array]] = field(default_factory=dict)
 
-    known: dict[bytes, tuple[Array, Array]] = {}
-
-    def asked(scaled: Array) -> tuple[Array, Array]:
+    def at(self, scaled: Array) -> tuple[Array, Array]:
+        """Return what the model says (n,) and its Jacobian (n, p), both over the deviations."""
         key = scaled.tobytes()
-        if key not in known:
-            known.clear()
-            known[key] = model(scaled)
-        return known[key]
+        if key not in self.known:
+            self.count += 1
+            self.known.clear()
+            values, deviations = self.scales.values(scaled), self.predictor.deviations
+            answers, slopes = self.predictor.answers(values)
+            self.known[key] = answers / deviations, slopes * self.scales.slopes(values) / deviations[:, None]
+        return self.known[key]
 
+
+def _fitted(scene: Scene, predictor: Predictor, scales: _Scales, held: Predictor | None) -> Identification:
+    asked, measured = _Asked(predictor, scales), predictor.measured / predictor.deviations
     begin = scales.scaled(scales.start)
-    _linearized(scales, asked(begin)[1] / deviations[:, None], measured / deviations, known=predictor.is_absolute)
+    _linearized(scales, asked.at(begin)[1], measured, known=predictor.is_absolute)
     found = scipy.optimize.least_squares(
-        lambda scaled: (asked(scaled)[0] - measured) / deviations,
+        lambda scaled: asked.at(scaled)[0] - measured,
         begin,
-        jac=lambda scaled: asked(scaled)[1] / deviations[:, None],
+        jac=lambda scaled: asked.at(scaled)[1],
         bounds=(scales.lowest, scales.highest),
         x_scale="jac",
         xtol=1e-12,
         ftol=1e-12,
         gtol=1e-14,
     )
-    answers, slopes = asked(found.x)
-    white = slopes / deviations[:, None]
+    return _result(scene, asked, found.x, held)
+
+
+def _result(scene: Scene, asked: _Asked, scaled: Array, held: Predictor | None) -> Identification:
+    """Return what is known at the minimum."""
+    predictor, scales = asked.predictor, asked.scales
+    answers, white = asked.at(scaled)
+    residuals = predictor.measured / predictor.deviations - answers
     # The linear model at the minimum: residuals as they are, values as they were found.
-    right = (measured - answers) / deviations + white @ found.x
-    linear = _linearized(scales, white, right, known=predictor.is_absolute)
-    values = scales.values(found.x)
-    changes = dict(zip(scales.paths, values.tolist(), strict=True))
-    prediction = None if held is None else _predicted(held, scales, found.x, linear)
+    linear = _linearized(scales, white, residuals + white @ scaled, known=predictor.is_absolute)
+    values = scales.values(scaled)
     return Identification(
-        scene.with_values(changes),
-        _parameters(scales, found.x, linear),
-        measured,
-        answers,
-        deviations * (1.0 if predictor.is_absolute else linear.deviation),
+        scene.with_values(dict(zip(scales.paths, values.tolist(), strict=True))),
+        _parameters(scales, scaled, linear),
+        predictor.measured,
+        answers * predictor.deviations,
+        predictor.deviations * (1.0 if predictor.is_absolute else linear.deviation),
         linear,
         _condition(white * _relative(scales, values)),
-        whiteness((measured - answers) / deviations),
-        prediction,
-        count,
+        whiteness(residuals),
+        None if held is None else _predicted(held, scales, scaled, linear),
+        asked.count,
+        predictor.rows,
     )
 
 
@@ -375,28 +265,3 @@ def _predicted(held: Predictor, scales: _Scales, scaled: Array, linear: LinearFi
     reach = float(scipy.stats.t.ppf(0.5 + 0.5 * CONFIDENCE, linear.degrees_of_freedom))
     inside = float(np.mean(np.abs(away) <= reach * spread))
     return Prediction(len(away), float(np.sqrt(np.mean(away**2))), float(np.max(np.abs(away))), inside)
-
-
-def plain(found: Identification) -> dict[str, Any]:
-    """Return the result as plain data, SI."""
-    prediction = found.prediction
-    return {
-        "parameters": [
-            {
-                "path": one.path,
-                "value": one.value,
-                "start": one.start,
-                "standard_error": one.standard_error,
-                "interval": list(one.interval),
-                "scale": "log" if one.is_log else "linear",
-            }
-            for one in found.parameters
-        ],
-        "correlation": found.correlation.tolist(),
-        "condition": found.condition,
-        "rows": len(found.measured),
-        "deviation": found.linear.deviation,
-        "whiteness": vars(found.whiteness),
-        "prediction": None if prediction is None else vars(prediction),
-        "evaluations": found.evaluations,
-    }

@@ -24,8 +24,35 @@ FITTED = ("tip_deflection", "push_force")
 STEP = 1e-4  # of a parameter: of the differences of a run
 
 
+@dataclass(frozen=True)
+class MeasuredRow:
+    """Where a measured value comes from.
+
+    Attributes
+    ----------
+    source, column
+        Data set and column.
+    depth, time
+        [m], [s]; None where the data do not say.
+    """
+
+    source: str
+    column: str
+    depth: float | None
+    time: float | None
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the value."""
+        return "N" if self.column == "push_force" else "m"
+
+
 class Predictor(Protocol):
     """The model of some rows."""
+
+    @property
+    def rows(self) -> tuple[MeasuredRow, ...]:
+        """Where each row comes from."""
 
     @property
     def measured(self) -> Array:
@@ -51,6 +78,7 @@ class AtRest:
     measured: Array
     deviations: Array
     is_absolute: bool
+    rows: tuple[MeasuredRow, ...]
 
     def answers(self, values: Array) -> tuple[Array, Array]:
         """Return deflections and exact sensitivities."""
@@ -67,6 +95,7 @@ class InMotion:
     measured: Array
     deviations: Array
     is_absolute: bool
+    rows: tuple[MeasuredRow, ...]
 
     def answers(self, values: Array) -> tuple[Array, Array]:
         """Return what runs say; one run, and two for each parameter."""
@@ -101,15 +130,16 @@ def predictor_of(
     names = [name for one in sets for name in _fitted_columns(one)]
     measured = np.concatenate([one[name] for one in sets for name in _fitted_columns(one)])
     known = _deviations(sets, names, deviations)
+    rows = tuple(row for one in sets for name in _fitted_columns(one) for row in _rows(one, name))
     at_rest = all("depth" in one for one in sets) and "push_force" not in names and _rests(scene)
     if at_rest:
         places, order = _places(scene, sets)
         problem = static_problem(scene, places, paths)
         if problem is not None:
-            return AtRest(problem, measured[order], known[order], bool(deviations))
+            return AtRest(problem, measured[order], known[order], bool(deviations), tuple(rows[one] for one in order))
     if not all("time" in one for one in sets):
         raise SceneError("data: need a column 'time [s]' here (got none): only equilibria of plain loads are known by depth")
-    return InMotion(_fixed(scene), tuple(paths), tuple(sets), measured, known, bool(deviations))
+    return InMotion(_fixed(scene), tuple(paths), tuple(sets), measured, known, bool(deviations), rows)
 
 
 def _rests(scene: Scene) -> bool:
@@ -126,6 +156,12 @@ def _fitted_columns(data: Measurements) -> list[str]:
         allowed = f"{', '.join(FITTED)}, {SHAPE}<mm>"
         raise SceneError(f"{data.source}: has no column that could be fitted (got {', '.join(data.names)}; allowed {allowed})")
     return found
+
+
+def _rows(data: Measurements, name: str) -> list[MeasuredRow]:
+    """Return where the values of a column come from."""
+    depths, times = (data[key].tolist() if key in data else [None] * data.size for key in ("depth", "time"))
+    return [MeasuredRow(data.source, name, depth, time) for depth, time in zip(depths, times, strict=True)]
 
 
 def _station(name: str, length: float) -> float:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from fem_needle import SceneError, load_scene, run_scene
-from fem_needle.identification.fit import identify, plain, whiteness
+from fem_needle.identification.fit import identify, whiteness
 from fem_needle.identification.measurements import Measurements
+from fem_needle.identification.result import columns, plain
 from fem_needle.identification.static_model import Place, static_problem, value_at
 
 LAYERED = load_scene("brachytherapy").with_values(
@@ -103,6 +104,9 @@ def test_what_is_reported():
     content = plain(found)
     assert [one["path"] for one in content["parameters"]] == MODULI
     assert content["rows"] == 15
+    table = columns(found)
+    assert table["depth [m]"] == DEPTHS[:15].tolist()
+    np.testing.assert_allclose(np.add(table["fitted [unit]"], table["residual [unit]"]), measured["tip_deflection"][:15])
     given = identify(LAYERED, MODULI, measured, deviations={"tip_deflection": NOISE})
     assert given.linear.degrees_of_freedom == np.inf
     assert given[MODULI[0]].standard_error > 0.0
@@ -139,6 +143,7 @@ def test_shapes_are_fitted_too():
     found = identify(start, [MODULI[0], "loads.0.force"], Measurements(columns))
     assert [one.value for one in found.parameters] == pytest.approx([5e3, 0.5], rel=1e-6)
     assert [one.is_log for one in found.parameters] == [True, False]
+    assert [(row.depth, row.column) for row in found.rows[2:4]] == [(0.05, "deflection_at_200"), (0.09, "deflection_at_120")]
 
 
 def test_friction_from_the_push_of_a_run():
