@@ -24,6 +24,7 @@ from fem_needle.identification.least_squares import (
     zero_phase,
 )
 from fem_needle.identification.measurements import Measurements, read_measurements, sampling_interval
+from fem_needle.identification.sample_data import sample_names, sample_path
 from fem_needle.identification.spread import Spread, spread
 from fem_needle.identification.stiffness import (
     Softening,
@@ -62,6 +63,8 @@ __all__ = [
     "read_measurements",
     "repeat_friction_experiment",
     "rod_modulus_of_point",
+    "sample_names",
+    "sample_path",
     "sampling_interval",
     "section_moment",
     "spread",
