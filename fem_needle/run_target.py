@@ -12,7 +12,7 @@ from fem_needle.manifest import is_run_folder
 # What a run folder holds, exports of an older run included; `force` removes this and nothing else.
 EXPORTS = ("series.csv", "deflection.csv", "series.mat", "deflection.vtkhdf")
 FILES = ("summary.json", "series.nc", "steer.png", "deflection.pvd", *EXPORTS, "scene.toml", "manifest.json")
-STUDIES = ("converge.json", "compare.json", "analyze.json", "benchmark.json", "steer.json")
+STUDIES = ("converge.json", "compare.json", "analyze.json", "benchmark.json", "steer.json", "identify.json")
 FRAMES = (("needle", "*.vtp"), ("tissue", "*.vtu"))
 
 

@@ -24,6 +24,7 @@ GROUPS = (
     "fem_needle.cli.converge",
     "fem_needle.cli.analyze",
     "fem_needle.cli.compare",
+    "fem_needle.cli.identify",
     "fem_needle.cli.benchmark",
 )
 ENTRY_POINTS = "fem_needle.commands"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -126,6 +127,11 @@ class Identification:
         return self.linear.correlation
 
     @property
+    def deviations_given(self) -> bool:
+        """Whether the standard deviations were given, not found from the residuals."""
+        return self.linear.degrees_of_freedom == inf
+
+    @property
     def residuals(self) -> Array:
         """Measured minus fitted (n,), SI."""
         return self.measured - self.fitted
@@ -171,7 +177,7 @@ def columns(found: Identification) -> dict[str, list[Any]]:
         "unit": [row.unit for row in found.rows],
         "depth [m]": [row.depth for row in found.rows],
         "time [s]": [row.time for row in found.rows],
-        "measured [unit]": found.measured.tolist(),
-        "fitted [unit]": found.fitted.tolist(),
-        "residual [unit]": found.residuals.tolist(),
+        "measured [SI]": found.measured.tolist(),
+        "fitted [SI]": found.fitted.tolist(),
+        "residual [SI]": found.residuals.tolist(),
     }

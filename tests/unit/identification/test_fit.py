@@ -106,7 +106,7 @@ def test_what_is_reported():
     assert content["rows"] == 15
     table = columns(found)
     assert table["depth [m]"] == DEPTHS[:15].tolist()
-    np.testing.assert_allclose(np.add(table["fitted [unit]"], table["residual [unit]"]), measured["tip_deflection"][:15])
+    np.testing.assert_allclose(np.add(table["fitted [SI]"], table["residual [SI]"]), measured["tip_deflection"][:15])
     given = identify(LAYERED, MODULI, measured, deviations={"tip_deflection": NOISE})
     assert given.linear.degrees_of_freedom == np.inf
     assert given[MODULI[0]].standard_error > 0.0
