@@ -207,9 +207,10 @@ def value_at(scene: Scene, path: str) -> float:
         if isinstance(found, tuple):
             found = found[int(key)] if key.isdigit() and int(key) < len(found) else None
         else:
-            found = getattr(found, key, None)
+            found = getattr(found, key, None) if key in getattr(type(found), "model_fields", ()) else None
     if not isinstance(found, float):
-        raise SceneError(f"{path}: is no number of the scene that could be fitted (got {found!r})")
+        what = "nothing of this name" if found is None else f"a {type(found).__name__}"
+        raise SceneError(f"{path}: is no number of the scene that could be fitted (got {what})")
     return found
 
 
