@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from fem_needle.errors import SceneError
 from fem_needle.identification.measurements import Measurements
 from fem_needle.identification.static_model import Place, StaticProblem, static_problem
+from fem_needle.modal_stepper import needs_no_steps
+from fem_needle.motion import run_duration
 from fem_needle.scene import Scene
 from fem_needle.simulation import run_scene
 from fem_needle.trajectory import Trajectory
@@ -21,6 +23,8 @@ Array = NDArray[np.float64]
 
 SHAPE = "deflection_at_"  # and an arc length in mm
 FITTED = ("tip_deflection", "push_force")
+SAMPLES_BETWEEN, MOST_BETWEEN, MOST_SAMPLES = 4, 40, 20_000  # of a run: fewest and most in a measured interval; in all
+HIT = 1e-6  # of a sample's interval: a measured time that is a sample's
 STEP = 1e-4  # of a parameter: of the differences of a run
 
 
@@ -139,7 +143,7 @@ def predictor_of(
             return AtRest(problem, measured[order], known[order], bool(deviations), tuple(rows[one] for one in order))
     if not all("time" in one for one in sets):
         raise SceneError("data: need a column 'time [s]' here (got none): only equilibria of plain loads are known by depth")
-    return InMotion(_fixed(scene), tuple(paths), tuple(sets), measured, known, bool(deviations), rows)
+    return InMotion(_fixed(_sampled(scene, sets)), tuple(paths), tuple(sets), measured, known, bool(deviations), rows)
 
 
 def _rests(scene: Scene) -> bool:
@@ -205,11 +209,23 @@ def _deviations(sets: Sequence[Measurements], names: Sequence[str], given: Mappi
     return np.concatenate([np.full(one.size, given.get(name, 1.0)) for one in sets for name in _fitted_columns(one)])
 
 
+def _sampled(scene: Scene, sets: Sequence[Measurements]) -> Scene:
+    """Return the scene with samples at the measured times, or dense enough between them, where it says nothing of them."""
+    if scene.numerics.output_step != "auto":
+        return scene
+    times = np.concatenate([one["time"] for one in sets])
+    closest = min(float(np.min(np.diff(one["time"]))) for one in sets if one.size > 1)
+    # At the times themselves nothing is interpolated, so that kinks do no harm.
+    shares = (closest / parts for parts in range(SAMPLES_BETWEEN, MOST_BETWEEN + 1))
+    step = next((one for one in shares if np.all(np.abs(times / one - np.round(times / one)) < HIT)), closest / SAMPLES_BETWEEN)
+    return scene.with_value("numerics.output_step", max(step, run_duration(scene) / MOST_SAMPLES))
+
+
 def _fixed(scene: Scene) -> Scene:
     """Return the scene with the mesh and the steps that a run of it chooses: differences of runs must not see other ones."""
     first = run_scene(scene)
     changes: dict[str, float | int | str] = {}
-    if scene.numerics.time_step == "auto":
+    if scene.numerics.time_step == "auto" and not needs_no_steps(scene):
         changes["numerics.time_step"] = float(first.summary["time_step"])
     if "elements" in first.summary and scene.numerics.mesh is None:
         changes["numerics.elements"] = int(first.summary["elements"])

@@ -159,6 +159,17 @@ def test_friction_from_the_push_of_a_run():
     assert [one.value for one in found.parameters] == pytest.approx([0.56, 0.3], rel=1e-6)
 
 
+def test_a_modulus_from_a_vibration():
+    """A needle let go: its run needs no time steps, and a fit must not give it any."""
+    scene = load_scene("release").with_value("numerics.elements", 3)
+    run = run_scene(scene, output_step=scene.duration / 400)
+    measured = Measurements({"time": run.time[1:-1:4], "tip_deflection": run.tip_deflection[1:-1:4]})
+    path = "tissue.layers.0.foundation_modulus"
+    true = value_at(scene, path)
+    found = identify(scene.with_value(path, 1.02 * true), [path], measured)
+    assert found[path].value == pytest.approx(true, rel=1e-4)
+
+
 def test_a_layer_has_a_number_or_a_name():
     path = "tissue.layers.prostate region.foundation_modulus"
     found = identify(LAYERED.with_value(MODULI[1], 9e4), [path], data(tips(LAYERED)))
