@@ -7,15 +7,12 @@ from math import copysign, inf, isfinite
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from fem_needle.control.signals import own_value
+from fem_needle.control.signals import actuator_rate, limited, own_value
 from fem_needle.errors import SceneError
 from fem_needle.plant import Plant
-from fem_needle.scene import Actuator, LateralLoad, Scene, Table, TipLoad
+from fem_needle.scene import LateralLoad, Scene, Table, TipLoad
 from fem_needle.scene.cross_checks import input_obstacle
-from fem_needle.scene.steering import INPUT_UNITS
 from fem_needle.scene.time_quantity import TimeValue
-
-FREE = Actuator()
 
 
 class Ramp(NamedTuple):
@@ -100,7 +97,7 @@ class Inputs(NamedTuple):
                 raise SceneError(f"{name}: is not finite (got {wanted:g} at time {time:g} s; allowed any finite number)")
             target = limited(self.scene, name, float(wanted))
             if known is None or known.target != target:
-                changed[name] = Ramp(time, self.value(name, time), target, _rate(self.scene, name))
+                changed[name] = Ramp(time, self.value(name, time), target, actuator_rate(self.scene, name))
         return Inputs(self.scene, {**self.ramps, **changed}) if changed else self
 
     def value(self, name: str, time: float) -> float:
@@ -128,21 +125,6 @@ def _check_input(scene: Scene, name: str) -> None:
         raise SceneError(f"command: '{name}' {obstacle}")
 
 
-def limited(scene: Scene, name: str, wanted: float) -> float:
-    """Return a command cut to the limits of its actuator; a direction also to -1 to 1."""
-    actuator = getattr(scene.actuators, name) or FREE
-    if name == "tip_direction":
-        wanted = min(max(wanted, -1.0), 1.0)
-    if actuator.maximum is not None:
-        wanted = min(wanted, actuator.maximum)
-    return wanted if actuator.minimum is None else max(wanted, actuator.minimum)
-
-
-def _rate(scene: Scene, name: str) -> float:
-    actuator = getattr(scene.actuators, name) or FREE
-    return inf if actuator.rate is None else actuator.rate
-
-
 def with_inputs(scene: Scene, functions: Mapping[str, TimeValue]) -> Scene:
     """Return a scene with some inputs replaced, without checking it again: commands are numbers within limits."""
     support = {name: value for name, value in functions.items() if name in {"hub_deflection", "hub_angle", "hub_torque"}}
@@ -158,7 +140,3 @@ def with_inputs(scene: Scene, functions: Mapping[str, TimeValue]) -> Scene:
         changes["loads"] = tuple(changed)
     return scene.model_copy(update=changes)
 
-
-def input_unit(name: str) -> str:
-    """Return the SI unit of an input."""
-    return INPUT_UNITS[name]

@@ -67,13 +67,26 @@ class Limits:
 FREE = Limits()
 
 
-def actuator_limits(scene: Scene) -> Limits:
-    """Return the limits of the controller's input; a direction is a cosine and never leaves -1 to 1."""
-    name = scene.controller.input
-    least, most = (-1.0, 1.0) if name == "tip_direction" else (-inf, inf)
+def limited(scene: Scene, name: str, wanted: float) -> float:
+    """Return a command cut to the limits of its actuator, SI; a direction is a cosine and never leaves -1 to 1."""
     actuator = getattr(scene.actuators, name)
+    if name == "tip_direction":
+        wanted = min(max(wanted, -1.0), 1.0)
     if actuator is None:
-        return Limits(least, most)
-    minimum = least if actuator.minimum is None else max(least, actuator.minimum)
-    maximum = most if actuator.maximum is None else min(most, actuator.maximum)
-    return Limits(minimum, maximum, inf if actuator.rate is None else actuator.rate * scene.controller.period)
+        return wanted
+    if actuator.maximum is not None:
+        wanted = min(wanted, actuator.maximum)
+    return wanted if actuator.minimum is None else max(wanted, actuator.minimum)
+
+
+def actuator_rate(scene: Scene, name: str) -> float:
+    """Return by how much an input may change in a second, SI."""
+    actuator = getattr(scene.actuators, name)
+    return inf if actuator is None or actuator.rate is None else actuator.rate
+
+
+def actuator_limits(scene: Scene) -> Limits:
+    """Return the limits of the controller's input."""
+    name = scene.controller.input
+    step = actuator_rate(scene, name) * scene.controller.period
+    return Limits(limited(scene, name, -inf), limited(scene, name, inf), step)

@@ -90,11 +90,6 @@ class SensorRig:
                 self._known.update(under_way.popleft()[1])
         return self._known.copy()
 
-    def next_arrival(self, time: float) -> float:
-        """Return when the next reading becomes known after ``time`` [s]; infinite if none is under way."""
-        arrivals = (arrival for channel in self._delayed for arrival, _ in channel.under_way if arrival > time + channel.slack)
-        return min(arrivals, default=inf)
-
 
 class _Channel:
     """One sensor under way: its clock, its losses, and the readings that have not arrived yet."""

@@ -15,7 +15,7 @@ CLOCKED = {"period": 0.1}
 
 def test_without_sensors_nothing_is_due():
     rig = rig_of()
-    assert (rig.next_time, rig.next_arrival(0.0)) == (inf, inf)
+    assert rig.next_time == inf
     rig.sample(Known())
     assert rig.known(0.0) == {}
 
@@ -78,27 +78,24 @@ def test_a_delayed_reading_is_known_from_its_arrival_on():
         truth.depth = 0.01 * (number + 1)
         rig.sample(truth)
     assert rig.known(0.0) == {}
-    assert rig.next_arrival(0.0) == 1.25
     assert rig.known(1.25 - 1e-9) == {}
     assert rig.known(1.25) == {"depth": 0.01}
-    assert rig.next_arrival(1.25) == 1.75
     assert rig.known(nextafter(1.75, 0.0)) == {"depth": 0.02}  # rounding does not cost a period
     assert rig.known(2.7) == {"depth": 0.03}  # arrived at 2.25; the next one at 2.75
     assert rig.known(4.0) == {"depth": 0.05}
-    assert rig.next_arrival(4.0) == inf
 
 
-def test_the_next_arrival_is_that_of_the_first_sensor():
+def test_each_sensor_has_its_own_delay():
     rig = rig_of(Sensor(kind="encoder", period=1.0, delay=0.3), Sensor(kind="base-moment", period=1.0, delay=0.2))
-    assert rig.next_arrival(0.0) == inf  # nothing was read yet
     rig.sample(Known())
-    assert [rig.next_arrival(time) for time in (0.0, 0.1, 0.2, 0.25, 0.3)] == [0.2, 0.2, 0.3, 0.3, inf]
+    found = [sorted(rig.known(time)) for time in (0.1, 0.2, 0.25, 0.3)]
+    assert found == [[], ["hub_moment"], ["hub_moment"], ["depth", "hub_moment"]]
 
 
-def test_a_sensor_without_delay_has_nothing_under_way():
+def test_a_sensor_without_delay_is_known_at_once():
     rig = rig_of(Sensor(kind="encoder"))
     rig.sample(Known())
-    assert rig.next_arrival(-1.0) == inf
+    assert set(rig.known(0.0)) == {"depth"}
 
 
 def test_what_is_known_does_not_change_afterwards():
