@@ -115,8 +115,7 @@ def test_what_is_reported():
 def test_a_wrong_model_shows_in_the_residuals():
     """Finite elements' tips in stiff tissue, fitted by two modes: biased, and the residuals are not white."""
     truth = FREE.with_values({"tissue.layers": [{"foundation_modulus": 2e4}], "loads": [{"kind": "tip", "force": 0.1}]})
-    start = truth.with_values({"model.kind": "assumed-modes", "numerics.elements": "auto"})
-    found = identify(start, ["tissue.layers.0.foundation_modulus"], data(tips(truth)))
+    found = identify(truth, ["tissue.layers.0.foundation_modulus"], data(tips(truth)), "assumed-modes")
     assert abs(found.parameters[0].value / 2e4 - 1.0) > 0.01
     assert found.whiteness.p_value < 1e-3
 
