@@ -20,10 +20,12 @@ from fem_needle.run_job import Job, Nobody, Observer, run_live, stepper_of
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
 from fem_needle.steppers import StaticStepper
+from fem_needle.threads import one_thread
 from fem_needle.trajectory import Trajectory
 
 ROUNDING_MARGIN = 2.0  # times the round-off: the smallest tolerance that is attempted
 
+@one_thread
 def run_scene(
     scene: Scene,
     *,
@@ -102,6 +104,7 @@ def run_scene(
     return _run(Job(chosen, scene, choice, observer or Nobody(), started))
 
 
+@one_thread
 def simulate(
     plant: Plant,
     *,
@@ -143,7 +146,7 @@ def _refuse_rounding(scene: Scene, chosen: ChosenPlant) -> None:
 def _run(job: Job) -> Trajectory:
     """Run with the given step, or with steps chosen from the differences of trial runs."""
     for message in job.plant.warnings:
-        warnings.warn(message, SuspiciousValueWarning, stacklevel=3)
+        warnings.warn(message, SuspiciousValueWarning, stacklevel=4)
     given, analysis = job.scene.numerics.time_step, job.choice.analysis
     if isinstance(given, float):
         return run_live(job, given, None)

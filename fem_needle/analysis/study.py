@@ -28,6 +28,7 @@ from fem_needle.models import build_plant, model_family
 from fem_needle.motion import depth_law, run_duration
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene
+from fem_needle.threads import one_thread
 
 Array = NDArray[np.float64]
 
@@ -155,6 +156,7 @@ class Analysis:
         return columns
 
 
+@one_thread
 def analyze(
     scene: Scene,
     depths: Sequence[float] | None = None,

@@ -20,6 +20,7 @@ from fem_needle.errors import ComputationError, SceneError
 from fem_needle.models import build_plant
 from fem_needle.scene import Scene
 from fem_needle.simulation import run_scene
+from fem_needle.threads import one_thread
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -62,6 +63,7 @@ class ManyRuns:
         return self.tip_deflection[np.arange(len(last)), last]
 
 
+@one_thread
 def simulate_many(
     scenes: Scene | Sequence[Scene],
     parameters: Mapping[str, ArrayLike] | None = None,

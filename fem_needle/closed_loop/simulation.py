@@ -27,6 +27,7 @@ from fem_needle.samples import Sample
 from fem_needle.scene import Scene
 from fem_needle.sensing.rig import SensorRig
 from fem_needle.skipping import Skipped, unneeded_terms
+from fem_needle.threads import one_thread
 from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
 
 Array = NDArray[np.float64]
@@ -80,6 +81,7 @@ class Simulation:
     steps end at every change of a command, so that no pulse is stepped over, however short.
     """
 
+    @one_thread
     def __init__(
         self,
         plant: Plant,
@@ -146,6 +148,7 @@ class Simulation:
         """How many time steps were taken."""
         return self._engine.steps
 
+    @one_thread
     def step(self, command: Mapping[str, float] | None = None, duration: float | None = None) -> dict[str, Any]:
         """Let a command act for a while and return what the sensors tell at its end.
 

@@ -25,6 +25,7 @@ from fem_needle.run_job import time_stepper
 from fem_needle.scene import Controller as ControllerSettings
 from fem_needle.scene import Scene
 from fem_needle.steppers import StaticStepper
+from fem_needle.threads import one_thread
 from fem_needle.trajectory import Trajectory
 
 MOST_REFINEMENTS = 10
@@ -115,6 +116,7 @@ class Loop:
         return [*(number * self.period for number in range(1, count)), duration]
 
 
+@one_thread
 def steer(
     scene: Scene,
     *,

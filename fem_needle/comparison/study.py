@@ -25,6 +25,7 @@ from fem_needle.plant import Plant
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
 from fem_needle.statics import solve_static
+from fem_needle.threads import one_thread
 
 Array = NDArray[np.float64]
 
@@ -55,6 +56,7 @@ class _Setting:
         return common | ({} if reference is None else {"time_step": reference.run.summary["time_step"]})
 
 
+@one_thread
 def compare(
     scene: Scene,
     *,

@@ -22,6 +22,7 @@ from fem_needle.convergence.theoretical_order import theoretical_order
 from fem_needle.errors import SceneError
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
+from fem_needle.threads import one_thread
 
 DEFAULT_VALUES = {"elements": (4, 8, 16, 32), "modes": (1, 2, 4, 8)}
 DEFAULT_HALVINGS = 4
@@ -98,6 +99,7 @@ class ConvergenceStudy:
         return result
 
 
+@one_thread
 def converge(
     scene: Scene,
     over: Over = "elements",

@@ -22,6 +22,7 @@ from fem_needle.identification.predictions import Predictor, predictor_of
 from fem_needle.identification.result import Identification, Parameter, Prediction, Whiteness
 from fem_needle.identification.static_model import value_at
 from fem_needle.scene import Scene
+from fem_needle.threads import one_thread
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,7 @@ WORST_CONDITION = 1e7  # of the Jacobian in relative units: beyond it rounding o
 MOST_LAGS = 10
 
 
+@one_thread
 def identify(
     scene: Scene,
     parameters: Sequence[str],

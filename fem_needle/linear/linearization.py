@@ -19,11 +19,13 @@ from fem_needle.linear.small_motion import OperatingPoint, SmallMotion, operatin
 from fem_needle.loads import turns_with_needle
 from fem_needle.plant import Plant
 from fem_needle.scene import LateralLoad, Scene
+from fem_needle.threads import one_thread
 
 Array = NDArray[np.float64]
 Axial = Literal["free", "held"]
 
 
+@one_thread
 def linearize(
     plant: Plant, *, depth: float, time: float = 0.0, speed: float = 0.0, axial: Axial = "free"
 ) -> LinearModel:
