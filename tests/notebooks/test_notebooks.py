@@ -30,7 +30,9 @@ def test_a_notebook_is_its_script_without_outputs(path):
 
 
 @pytest.mark.filterwarnings("ignore")  # of the client's own loop and sockets
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", [pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem == "05_control")) for path in NOTEBOOKS]
+)
 def test_a_notebook_runs_and_draws(path, tmp_path):
     notebook = nbformat.read(path, as_version=4)
     NotebookClient(notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}).execute()

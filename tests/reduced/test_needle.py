@@ -120,7 +120,7 @@ def test_modes_converge_to_the_elements_in_motion(basis, kinematics, static_corr
     layers = (Layer(start=0.0, foundation_modulus=5e3, damping=2.0),)
     model = Model(kinematics=kinematics)
     scene = scene_of("entry", moving(4.0, 0.1, 0.2), layers, [TipLoad(force=BUZZ)], model=model, duration=None)
-    settings = {"time_step": 5e-5, "analysis": "dynamic", "output_step": 1e-3}
+    settings = {"time_step": 1e-4, "analysis": "dynamic", "output_step": 1e-3}
     expected = simulate(FiniteElementNeedle(scene, elements=16), **settings).tip_deflection
     errors = []
     for modes in (2, 4, 8):
@@ -158,7 +158,7 @@ def test_a_push_against_an_independent_integration(variant, tissue):
 
 
 def pushed(variant, tissue, *, friction):
-    values = {"model.variant": variant, "model.kinematics": "fixed-frame", "run.duration": 6e-3, "insertion.initial_depth": 0.08}
+    values = {"model.variant": variant, "model.kinematics": "fixed-frame", "run.duration": 3e-3, "insertion.initial_depth": 0.08}
     values |= {"insertion.final_depth": None, "loads": [{"kind": "tip", "force": 0.02}]}
     if tissue == "tip-spring":
         values |= {"tissue.kind": "tip-spring", "tissue.layers": None, "tissue.tip_stiffness": 520.0}

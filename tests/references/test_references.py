@@ -220,7 +220,15 @@ def test_entry_converges(kinematics):
     assert largest_difference(coarse.tip_deflection, fine.tip_deflection) < 1e-4
 
 
-@pytest.mark.parametrize("guides", [[], [Guide(position=-0.03, stiffness=2e3)], [Guide(position=-0.03)]])
+@pytest.mark.parametrize(
+    "guides",
+    [
+        [],
+        pytest.param([Guide(position=-0.03, stiffness=2e3)], marks=pytest.mark.slow),
+        pytest.param([Guide(position=-0.03)], marks=pytest.mark.slow),
+    ],
+    ids=["no guide", "elastic", "rigid"],
+)
 def test_hub_converges(guides):
     loads = [TipLoad(force=0.1), LateralLoad(position=-0.005, force=BUZZ), TipLoad(bevel_coefficient=1e-6)]
     hub = Table(time=[0.0, 0.027, 0.054], value=[0.0, 1e-3, 0.0])

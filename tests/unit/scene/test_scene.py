@@ -291,7 +291,7 @@ def test_plain_data_has_what_was_given_and_no_more():
 
 
 @given(scene_data())
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 def test_plain_data_lose_nothing(data):
     scene = Scene.from_dict(data)
     assert Scene.from_dict(scene.to_dict()) == scene
@@ -320,7 +320,7 @@ JUNK = st.recursive(
 
 
 @given(scene_data(), PATHS, JUNK)
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 def test_junk_anywhere_is_a_scene_or_a_scene_error(data, path, junk):
     broken = dict(data)
     if len(path) == 2:
