@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+_UNFINISHED = re.compile(r"\..+\.\d+\.tmp")
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -24,7 +27,7 @@ def write_atomically(path: Path, content: bytes) -> None:
     Raises
     ------
     OSError
-        If it cannot be written; nothing is left behind.
+        If it cannot be written; nothing is left behind, except by a process that is killed: `is_unfinished` tells such a file.
     """
     beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
@@ -33,6 +36,11 @@ def write_atomically(path: Path, content: bytes) -> None:
     except BaseException:
         beside.unlink(missing_ok=True)
         raise
+
+
+def is_unfinished(path: Path) -> bool:
+    """Return whether a file is what a killed process left of `write_atomically`."""
+    return _UNFINISHED.fullmatch(path.name) is not None
 
 
 def json_bytes(value: Any) -> bytes:

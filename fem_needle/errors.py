@@ -38,3 +38,8 @@ class ComputationError(NeedleError, RuntimeError):
 
 class SuspiciousValueWarning(UserWarning):
     """Possible but unlikely input; the message names the inequality."""
+
+
+def no_memory(error: MemoryError) -> str:
+    """Return the message of a computation that found no memory."""
+    return f"not enough memory ({str(error) or 'no size told'}); use fewer elements, output_points or samples"

@@ -9,6 +9,7 @@ from pathlib import Path
 from fem_needle.atomic_file import write_atomically
 from fem_needle.csv_file import deflection_csv, series_csv
 from fem_needle.errors import ComputationError, SceneError
+from fem_needle.folder_lock import FolderLock
 from fem_needle.matlab_file import matlab_file
 from fem_needle.run_target import FRAMES
 from fem_needle.trajectory import Trajectory
@@ -90,8 +91,7 @@ def _export_frames(run: Trajectory, folder: Path, *, force: bool) -> tuple[Path,
     collection = folder / COLLECTION
     _check(collection, force=force)
     _check_frames(folder, force=force)
-    with _writing(collection):
-        folder.mkdir(parents=True, exist_ok=True)
+    with _writing(collection), _held(folder):
         collection.unlink(missing_ok=True)
         for name, pattern in FRAMES:
             for old in (folder / name).glob(pattern):
@@ -112,6 +112,17 @@ def _check_frames(folder: Path, *, force: bool) -> None:
         listed = force and (folder / COLLECTION).exists()
         if frames.is_dir() and any(frames.glob(pattern)) and not listed:
             raise SceneError(f"{frames}: holds frames of something else; they are left as they are (name another folder)")
+
+
+@contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """Create a folder and keep other writers out of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = FolderLock(folder)
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 @contextmanager

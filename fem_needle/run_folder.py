@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from fem_needle.atomic_file import json_bytes, write_atomically
 from fem_needle.errors import ComputationError, SceneError
+from fem_needle.folder_lock import FolderLock, is_locked
+from fem_needle.manifest import FAILED, FINISHED, INTERRUPTED, RUNNING, is_run_folder, manifest, state_of
 from fem_needle.manifest import FILE as MANIFEST
-from fem_needle.manifest import is_run_folder, manifest
 from fem_needle.plant import Plant
 from fem_needle.run_target import RunTarget
 from fem_needle.samples import Sample
@@ -69,6 +70,7 @@ class RunFolderWriter:
         self._manifest: dict[str, Any] = {}
         self._frames: VtkSeries | None = None
         self._reserve: IO[bytes] | None = None
+        self._claimed: FolderLock | None = None
         self._plant: Plant | None = None
         self._choice: dict[str, Any] = {}
         self._samples: list[Sample] = []
@@ -120,9 +122,12 @@ class RunFolderWriter:
         ComputationError
             If they cannot be written.
         """
-        run = self._save(run)
-        with _writing("the frames"):
-            self._finish_frames(run)
+        try:
+            run = self._save(run)
+            with _writing("the frames"):
+                self._finish_frames(run)
+        finally:
+            self._leave()
         return run
 
     def break_off(self, run: Trajectory | None, stop_reason: str) -> dict[str, Any]:
@@ -135,7 +140,12 @@ class RunFolderWriter:
         stop_reason
             Where the run itself gives none.
         """
-        run = self._seen(stop_reason) if run is None else run
+        try:
+            return self._break_off(self._seen(stop_reason) if run is None else run, stop_reason)
+        finally:
+            self._leave()
+
+    def _break_off(self, run: Trajectory | None, stop_reason: str) -> dict[str, Any]:
         if run is not None:
             run = self._save(run)
             # Where the disk is full, the frames that are there are listed and have to do.
@@ -153,8 +163,9 @@ class RunFolderWriter:
         return summary
 
     def _open(self, scene: Scene, arc_length: Array, rows: int) -> Path:
-        self._folder = folder = self._target.create()
-        self._manifest = manifest(scene)
+        self._manifest = manifest(scene)  # first: an interrupt from here on finds it
+        self._claimed = self._target.claim()
+        self._folder = folder = self._claimed.folder
         with _writing("the run folder"):
             write_atomically(folder / MANIFEST, json_bytes(self._manifest))
             write_atomically(folder / SCENE, scene_text(scene).encode("utf-8"))
@@ -182,6 +193,11 @@ class RunFolderWriter:
         warnings = dict.fromkeys((*self._warnings, *summary.get("warnings", ())))
         return summary | {"warnings": list(warnings), "folder": str(folder)}
 
+    def _leave(self) -> None:
+        """Let others have the folder."""
+        if self._claimed is not None:
+            self._claimed.release()
+
     def _release(self) -> None:
         if self._reserve is not None:
             self._reserve.close()
@@ -208,7 +224,8 @@ class RunFolderWriter:
             return
         write_atomically(self._folder / SUMMARY, json_bytes(summary))
         wall_time = summary.get("wall_time", perf_counter() - self._started)
-        write_atomically(self._folder / MANIFEST, json_bytes(self._manifest | {"wall_time": wall_time}))
+        state = summary["stop_reason"] if summary.get("stop_reason") in {INTERRUPTED, FAILED} else FINISHED
+        write_atomically(self._folder / MANIFEST, json_bytes(self._manifest | {"wall_time": wall_time, "state": state}))
 
 
 @contextmanager
@@ -248,8 +265,8 @@ def load_run(folder: Path) -> Trajectory:
     try:
         values = read_series(folder / SERIES)
         summary = json.loads((folder / SUMMARY).read_bytes())
-    except (OSError, ValueError) as error:
-        raise SceneError(f"{folder}: the run is not complete: {error}") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise SceneError(f"{folder}: the run is not complete: {_progress(folder) or error}") from None
     missing = {"time", "arc_length", "deflection", "guide_force", *VARIABLES} - set(values)
     if missing or not isinstance(summary, dict):
         raise SceneError(f"{folder}: the run is not complete: no {', '.join(sorted(missing)) or 'summary'}")
@@ -266,6 +283,15 @@ def load_run(folder: Path) -> Trajectory:
         station_deflection=values["deflection"],
         summary=summary | {"folder": str(folder.resolve())},
     )
+
+
+def _progress(folder: Path) -> str | None:
+    """Return why a run that has begun has no results yet; None where its manifest knows nothing of that."""
+    if state_of(folder) != RUNNING:
+        return None
+    if is_locked(folder):
+        return "it is being computed"
+    return "it was killed, or found no space for its results; the frames that it wrote are there"
 
 
 def _check_shapes(folder: Path, values: dict[str, Array]) -> None:

@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
+from fem_needle.atomic_file import is_unfinished
 from fem_needle.errors import SceneError
+from fem_needle.folder_lock import FolderLock, is_locked
+from fem_needle.manifest import FILE as MANIFEST
 from fem_needle.manifest import is_run_folder
 
 # What a run folder holds, exports of an older run included; `force` removes this and nothing else.
@@ -47,10 +50,19 @@ class RunTarget:
         """
         try:
             there = self.path.exists() or self.path.is_symlink()
-            if not there or (self.numbered and not self.force) or self._is_empty_folder():
+            if not there or (self.numbered and not self.force):
                 return
+            if is_locked(self.path):
+                raise SceneError(f"{self.path}: another run is writing into it; wait, or name another folder")
+            self._check_content()
+        except SceneError:
+            raise
         except (OSError, ValueError) as error:
             raise SceneError(f"{self.path}: cannot be used as a run folder: {error}") from None
+
+    def _check_content(self) -> None:
+        if self._is_empty_folder():
+            return
         if not is_run_folder(self.path):
             raise SceneError(f"{self.path}: exists and is no run folder; it is left as it is (name another folder)")
         if not self.force:
@@ -68,24 +80,42 @@ class RunTarget:
         SceneError
             As `check`, or if the folder cannot be created.
         """
+        claimed = self.claim()
+        claimed.release()
+        return claimed.folder
+
+    def claim(self) -> FolderLock:
+        """Create the folder and hold it, so that no other run writes into it until it is released.
+
+        Raises
+        ------
+        SceneError
+            As `check`, or if the folder cannot be created.
+        """
         self.check()
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            return self._made().resolve()
+            if self.numbered and not self.force:
+                return FolderLock(_first_free(self.path).resolve())
+            self.path.mkdir(exist_ok=True)
+            return self._cleared(FolderLock(self.path.resolve()))
+        except SceneError:
+            raise
         except (OSError, ValueError) as error:
             raise SceneError(f"{self.path}: cannot be created: {error}") from None
 
-    def _made(self) -> Path:
-        if self.numbered and not self.force:
-            return _first_free(self.path)
-        if self.path.exists():
-            _clear(self.path)
-        else:
-            self.path.mkdir()
-        return self.path
+    def _cleared(self, claimed: FolderLock) -> FolderLock:
+        """Empty a folder that is held; another run may have filled it since it was checked."""
+        try:
+            self._check_content()
+            _clear(claimed.folder)
+        except BaseException:
+            claimed.release()
+            raise
+        return claimed
 
     def _is_empty_folder(self) -> bool:
-        return self.path.is_dir() and not any(self.path.iterdir())
+        return self.path.is_dir() and all(is_unfinished(path) for path in self.path.iterdir())
 
 
 def _first_free(path: Path) -> Path:
@@ -101,13 +131,16 @@ def _first_free(path: Path) -> Path:
 
 
 def _clear(folder: Path) -> None:
-    """Remove the files of a run; the manifest last, so that what is left of a clearing broken off is still a run folder."""
+    """Remove the files of a run but the manifest, which the next one replaces: what is left is a run folder at any moment."""
     for name, pattern in FRAMES:
         frames = folder / name
         if frames.is_dir():
-            for path in frames.glob(pattern):
+            for path in (*frames.glob(pattern), *filter(is_unfinished, frames.iterdir())):
                 path.unlink()
             if not any(frames.iterdir()):
                 frames.rmdir()
     for name in FILES:
-        (folder / name).unlink(missing_ok=True)
+        if name != MANIFEST:
+            (folder / name).unlink(missing_ok=True)
+    for path in filter(is_unfinished, list(folder.iterdir())):
+        path.unlink()

@@ -11,7 +11,7 @@ from typing import Any
 
 from fem_needle.atomic_file import json_bytes, write_atomically
 from fem_needle.errors import ComputationError, SceneError
-from fem_needle.manifest import FILE, manifest
+from fem_needle.manifest import FILE, FINISHED, manifest
 from fem_needle.run_target import RunTarget
 from fem_needle.scene import Scene
 from fem_needle.scene_file import scene_text
@@ -77,20 +77,25 @@ class StudyFolder:
             If a file cannot be written.
         """
         self.check()
-        folder = self.target.create()
+        claimed, known = self.target.claim(), manifest(scene)
+        folder = claimed.folder
         files = {
-            FILE: json_bytes(manifest(scene)),
+            FILE: json_bytes(known),
             "scene.toml": scene_text(scene).encode("utf-8"),
             f"{self.name}.json": json_bytes(result),
             f"{self.name}.csv": csv_bytes(columns),
             f"{self.name}.png": picture,
             **(others or {}),
         }
+        finished = json_bytes(known | {"state": FINISHED})
         try:
             for name, content in files.items():
                 write_atomically(folder / name, content)
+            write_atomically(folder / FILE, finished)
         except OSError as error:
             raise ComputationError(f"{folder}: cannot be written: {error}") from error
+        finally:
+            claimed.release()
         return folder
 
 

@@ -169,7 +169,7 @@ class VtkSeries:
         paths = [self._folder / file for file in files]
         try:
             for path, content in zip(paths, contents, strict=True):
-                path.write_bytes(content)
+                write_atomically(path, content)
         except BaseException:
             for path in paths:
                 path.unlink(missing_ok=True)

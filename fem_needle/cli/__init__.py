@@ -7,14 +7,17 @@ entry point of the group ``fem_needle.commands``.
 
 from __future__ import annotations
 
+import signal
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module, metadata
 from typing import Annotated
 
 import typer
 
-from fem_needle.errors import NeedleError, SceneError, SuspiciousValueWarning
+from fem_needle.errors import NeedleError, SceneError, SuspiciousValueWarning, no_memory
 
 GROUPS = (
     "fem_needle.cli.scene_commands",
@@ -29,6 +32,7 @@ GROUPS = (
 )
 ENTRY_POINTS = "fem_needle.commands"
 
+ENDING = ("SIGTERM", "SIGHUP")
 WRONG_INPUT = 2
 FAILED = 1
 
@@ -37,11 +41,29 @@ def main() -> None:
     """Run the command line; exit status 0 done, 2 wrong input, 1 failed."""
     warnings.simplefilter("ignore", SuspiciousValueWarning)  # the commands show them themselves
     try:
-        build_application()()
+        with _ended_as_interrupted():
+            build_application()()
     except SceneError as error:
         _stop(error.mistakes, WRONG_INPUT)
     except NeedleError as error:
         _stop((str(error),), FAILED)
+    except MemoryError as error:
+        _stop((no_memory(error),), FAILED)
+
+
+@contextmanager
+def _ended_as_interrupted() -> Iterator[None]:
+    """Let whoever ends the program (SIGTERM) or closes its terminal (SIGHUP) interrupt it: what was computed is kept."""
+    signals = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
+    before = {number: signal.getsignal(number) for number in signals}
+    for number, handler in before.items():
+        if handler == signal.SIG_DFL:  # one that is ignored, as under nohup, stays so
+            signal.signal(number, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def build_application() -> typer.Typer:

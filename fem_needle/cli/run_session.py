@@ -9,7 +9,7 @@ import typer
 
 from fem_needle.cli.run_options import RUNS
 from fem_needle.cli.short_path import short_path
-from fem_needle.errors import ComputationError, NeedleError
+from fem_needle.errors import ComputationError, NeedleError, no_memory
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,6 +49,8 @@ def finished(compute: Callable[[], Trajectory], writer: RunFolderWriter, bar: Pr
         _stop(writer, None, "interrupted", "interrupted", quiet=quiet)
     except ComputationError as error:
         _stop(writer, error.partial, "failed", str(error), quiet=quiet)
+    except MemoryError as error:
+        _stop(writer, None, "failed", no_memory(error), quiet=quiet)
     finally:
         bar.stop()
 

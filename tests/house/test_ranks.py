@@ -20,6 +20,7 @@ RANKS = {
     "path": 0,
     "shipped": 0,
     "atomic_file": 0,
+    "folder_lock": 0,
     "threads": 0,
     "vtk_file": 0,
     "mesh_file": 0,
