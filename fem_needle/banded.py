@@ -122,6 +122,17 @@ def trailing(band: Array, dropped: int) -> Array:
     return part
 
 
+def leading_rows(band: Array, rows: int) -> Array:
+    """Return the first rows as a dense matrix, as many columns as they reach."""
+    middle, size = half_bandwidth(band), band.shape[1]
+    columns = np.arange(min(middle + max(rows, 1), size))
+    result = np.zeros((rows, len(columns)))
+    for row in range(rows):
+        reached = columns[: row + middle + 1]
+        result[row, : len(reached)] = band[middle + row - reached, reached]
+    return result
+
+
 class Factorization:
     """LU factors of a banded matrix with partial pivoting (LAPACK ``dgbtrf``).
 

@@ -46,6 +46,7 @@ class BeamNeedle(ABC):
     axial_force_acts = True
     largest_spectral_radius = 1.0
     warnings: tuple[str, ...] = ()
+    stiffness_round_off = 0.0
     has_table = True
 
     def __init__(self, scene: Scene, shapes: Shapes, frame: Frame, beam: Beam) -> None:

@@ -134,7 +134,7 @@ class Meshes:
         plant = self.needle(count)
         places, tips = instants(plant, MESH_INSTANTS), np.abs(static_tips(plant, MESH_INSTANTS))
         time, depth = places[int(np.argmax(tips))]
-        return round_off(plant, depth, time)
+        return round_off(plant, depth, time, stepped=self.analysis == "dynamic" or plant.foundation.is_damped)
 
 
 def _given_mesh(scene: Scene, parts: int) -> FiniteElementNeedle:

@@ -17,6 +17,8 @@ from fem_needle.steppers import DynamicStepper, StaticStepper, Stepper
 
 FEWEST_STEPS = 300  # fewer take no longer in numpy than the compiled loop takes to load
 
+LARGEST_LOSS, LOSS_SHARE = 1e-7, 0.01  # of the tip, of the tolerance: beyond, equilibria are solved one by one, by flexibility
+
 
 def run_loop(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample, None, RunEnd]:
     """Return the generator of a run's samples, in the loop that the scene's ``numerics.loop`` asks for.
@@ -31,7 +33,7 @@ def run_loop(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample
             raise _refused("a push decides its motion step by step")
         return march_pushed(plant, stepper, grid)
     if plant.has_table and plant.scene.numerics.loop == "auto":
-        if isinstance(stepper, StaticStepper):
+        if isinstance(stepper, StaticStepper) and not _loses_digits(plant):
             return equilibrium_march(plant, stepper, grid)
         if isinstance(stepper, ModalStepper):
             return modal_march(plant, stepper, grid)
@@ -40,6 +42,11 @@ def run_loop(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample
 
         return compiled_march(plant, stepper, grid)
     return march(plant, stepper, grid)
+
+
+def _loses_digits(plant: Plant) -> bool:
+    """Return whether rounding in the stiffness matrix is too much for equilibria."""
+    return plant.stiffness_round_off > min(LARGEST_LOSS, LOSS_SHARE * plant.scene.numerics.tolerance)
 
 
 def is_compiled(plant: Plant, stepper: Stepper, grid: TimeGrid) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from importlib import metadata
 from typing import Protocol
 
@@ -61,6 +62,7 @@ class ModelFamily(Protocol):
         """Return the plant for a run, with the sizes that the tolerance needs on "auto", and its estimated error."""
 
 
+@cache
 def model_family(kind: str) -> ModelFamily:
     """Return the family of a ``model.kind``.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from fem_needle.beam_matrices import ScaledBeam, stretched_part, whole_needle
 from fem_needle.beam_needle import BeamNeedle
+from fem_needle.elements.flexibility import FlexibleMesh
 from fem_needle.elements.kink import kink, kink_compliance, kink_shift_rate
 from fem_needle.elements.shapes import ElementShapes
 from fem_needle.errors import SceneError
 from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
 from fem_needle.mesh_file import MAXIMUM_ELEMENTS, mesh_positions, needle_nodes
+from fem_needle.plant import Operators
 from fem_needle.scene import Scene
 
 Array = NDArray[np.float64]
@@ -63,6 +66,8 @@ class FiniteElementNeedle(BeamNeedle):
         is_entry = scene.support.kind == "entry"
         frame: Frame = StretchedFrame() if is_entry else MaterialFrame(scene.needle.length)
         super().__init__(scene, self.mesh, frame, _beam(self.mesh, frame, scene))
+        self._flexible = FlexibleMesh(self.mesh)
+        self.stiffness_round_off = self._flexible.stiffness_round_off
 
     def deflection(self, coordinates: Array, forces: Array, depth: float, arc_length: Array, derivative: int = 0) -> Array:
         """Return w [m] or a derivative of it by arc length at stations from the hub (0) to the tip (l)."""
@@ -72,6 +77,11 @@ class FiniteElementNeedle(BeamNeedle):
     def describe(self) -> dict[str, int | float | str]:
         """Return kind, number of elements and degree."""
         return {"model": "fem", "elements": self.mesh.elements, "degree": self.mesh.degree}
+
+    def operators(self, depth: float, time: float) -> Operators:
+        """Return the matrices at a depth [m] and time [s]."""
+        bending_stiffness = self.scene.needle.bending_stiffness / self.frame.stretch(depth) ** 3
+        return replace(super().operators(depth, time), beam=self._flexible.stiffened(bending_stiffness))
 
     def _flexibilities(self, depths: Array, count: int) -> tuple[Array, Array]:
         """Return B and dB/dz over depths: points in one element bend it beyond its own shapes."""

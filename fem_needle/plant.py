@@ -29,6 +29,41 @@ Array = NDArray[np.float64]
 SMALLEST_COMPLIANCE = 1e-9  # of the needle's own: a guide's kink below it is taken as at a node
 
 
+class StiffnessFactorization(Protocol):
+    """Factors of the stiffness matrix of the coordinates that are not clamped."""
+
+    def solve(self, right: Array) -> Array:
+        """Solve for one right-hand side ``(n,)`` or several ``(n, m)``."""
+
+    def solve_supported(self, right: Array) -> tuple[Array, Array]:
+        """Solve, and return also what the clamped coordinates' equations take, ``(clamped,)`` or ``(clamped, m)``."""
+
+
+class FlexibleBeam(Protocol):
+    """The bending of a mesh in terms of what its elements transmit."""
+
+    def factorize(self, tissue: Array, clamped: int) -> StiffnessFactorization:
+        """Factor bending plus a tissue matrix (band storage), the first ``clamped`` coordinates held."""
+
+
+@dataclass(frozen=True, eq=False)
+class SupportedFactorization:
+    """Factors of the free coordinates' matrix and the clamped coordinates' rows, in dense storage, of the whole one."""
+
+    factors: banded.Factorization | banded.RestrictedFactorization
+    clamped_rows: Array
+
+    def solve(self, right: Array) -> Array:
+        """Solve for one right-hand side ``(n,)`` or several ``(n, m)``."""
+        return self.factors.solve(right)
+
+    def solve_supported(self, right: Array) -> tuple[Array, Array]:
+        """Solve, and return also what the clamped coordinates' equations take."""
+        free, clamped = self.solve(right), len(self.clamped_rows)
+        reached = self.clamped_rows[:, clamped:]
+        return free, reached @ free[: reached.shape[1]]
+
+
 @dataclass(frozen=True, eq=False)
 class Operators:
     """The matrices of a plant at one depth and time, in band storage; None where a term is absent.
@@ -50,6 +85,8 @@ class Operators:
         shapes are nearly dependent at this depth; None: all.
     positional_error, velocity_error
         X and Y: forces -X q - Y q' of a model with mistakes in it, which come from no energy and stand in no ledger.
+    beam
+        The bending K once more, in a form that keeps its digits on fine meshes; None of a model without elements.
     """
 
     mass: Array
@@ -65,6 +102,7 @@ class Operators:
     subspace: Array | None = None
     positional_error: Array | None = None
     velocity_error: Array | None = None
+    beam: FlexibleBeam | None = None
 
     @cached_property
     def stiffness(self) -> Array:
@@ -77,9 +115,12 @@ class Operators:
         return banded.factorize(banded.trailing(self.mass, self.clamped), self.subspace)
 
     @cached_property
-    def stiffness_factorization(self) -> banded.Factorization | banded.RestrictedFactorization:
+    def stiffness_factorization(self) -> StiffnessFactorization:
         """Factors of the stiffness matrix of the coordinates that are not clamped."""
-        return banded.factorize(banded.trailing(self.stiffness, self.clamped), self.subspace)
+        if self.beam is not None:
+            return self.beam.factorize(self.tissue, self.clamped)
+        factors = banded.factorize(banded.trailing(self.stiffness, self.clamped), self.subspace)
+        return SupportedFactorization(factors, banded.leading_rows(self.stiffness, self.clamped))
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +204,8 @@ class Plant(Protocol):
         Of the integrator of a moving needle: below 1 where vibrations that a step does not resolve would grow.
     warnings
         What a user should know of the model before trusting it.
+    stiffness_round_off
+        What a tip may lose, relative, to rounding in the stiffness matrix K; equilibria by `Operators.beam` lose nothing.
     has_table
         Whether it gives its matrices at many depths at once, which the compiled loop needs.
     """
@@ -175,6 +218,7 @@ class Plant(Protocol):
     axial_force_acts: bool
     largest_spectral_radius: float
     warnings: tuple[str, ...]
+    stiffness_round_off: float
     has_table: bool
 
     def operators(self, depth: float, time: float) -> Operators:

@@ -14,20 +14,22 @@ _NUDGES = (1, 2, 3, 5, 8, 13)  # units in which the depth is moved to see the ro
 _NUDGE = 2.0**-50
 
 
-def round_off(plant: Plant, depth: float, time: float) -> float:
+def round_off(plant: Plant, depth: float, time: float, *, stepped: bool) -> float:
     """Return the largest relative change of the tip's answer to a tip force as the depth moves by a few last digits.
 
-    The true change is as small as the digits; what shows is the round-off of forming and solving the equations.
+    With the stiffness matrix that time steps use, ``stepped``, or as equilibria are solved. The true change is as small as the
+    digits; what shows is the round-off of forming and solving the equations.
     """
     if depth < 2.0 * plant.smallest_depth:
         return 0.0
-    found = [_tip_compliance(plant, depth * (1.0 - nudge * _NUDGE), time) for nudge in (0, *_NUDGES)]
+    found = [_tip_compliance(plant, depth * (1.0 - nudge * _NUDGE), time, stepped=stepped) for nudge in (0, *_NUDGES)]
     return max(abs(value - found[0]) for value in found) / abs(found[0])
 
 
-def _tip_compliance(plant: Plant, depth: float, time: float) -> float:
+def _tip_compliance(plant: Plant, depth: float, time: float, *, stepped: bool) -> float:
     """Return the tip's deflection under a tip force of 1 N and nothing else [m]."""
     operators, points, case = plant.operators(depth, time), plant.points(depth), load_case(plant.scene, depth, time)
+    operators = replace(operators, beam=None) if stepped else operators
     forces = np.zeros_like(case.forces)
     forces[-1] = 1.0
     alone = replace(case, forces=forces, clamp=np.zeros_like(case.clamp))

@@ -20,6 +20,8 @@ from fem_needle.skipping import inertia_free_stepper
 from fem_needle.steppers import DynamicStepper, Inviscid, StaticStepper, Stepper
 from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
 
+ENERGY_BOUND = 0.01  # of the largest energy: a ledger that misses more says that the answer is not to be trusted
+
 
 class Observer(Protocol):
     """Somebody who watches a run: a progress bar, a writer of run folders."""
@@ -106,8 +108,19 @@ def _spectral_radius(plant: Plant, scene: Scene) -> float:
     return min(asked, plant.largest_spectral_radius) if moves else asked
 
 
+def rounding_warnings(job: Job) -> tuple[str, ...]:
+    """Return the warning of a mesh whose stiffness matrix loses more digits in time steps than the tolerance allows."""
+    loss, tolerance = job.plant.stiffness_round_off, job.scene.numerics.tolerance
+    if loss <= tolerance or isinstance(stepper_of(job), StaticStepper):
+        return ()
+    return (
+        f"rounding may cost {loss:.1e} of the tip > numerics.tolerance = {tolerance:g}: time steps subtract element stiffnesses "
+        "12 EI / h^3, which grow with the mesh; use fewer elements",
+    )
+
+
 def _warnings(job: Job) -> list[str]:
-    found = [*job.plant.warnings, *job.chosen.warnings]
+    found = [*job.plant.warnings, *rounding_warnings(job), *job.chosen.warnings]
     radius, asked = _spectral_radius(job.plant, job.scene), job.scene.numerics.spectral_radius
     if job.choice.analysis == "dynamic" and radius < asked:
         found.append(
@@ -160,7 +173,7 @@ def trajectory_of(job: Job, grid: TimeGrid, samples: list[Sample], time_error: f
         | summary_of(run)
         | {
             "error_estimate": estimate,
-            "warnings": _warnings(job),
+            "warnings": [*_warnings(job), *_energy_warnings(run)],
             "stop_reason": end.reason,
             "steps": end.steps,
             "step_unknowns": end.steps * job.plant.size,
@@ -169,6 +182,16 @@ def trajectory_of(job: Job, grid: TimeGrid, samples: list[Sample], time_error: f
         }
     )
     return run
+
+
+def _energy_warnings(run: Trajectory) -> list[str]:
+    residual = float(summary_of(run)["relative_energy_residual"])
+    if residual <= ENERGY_BOUND:
+        return []
+    return [
+        f"energies miss by {residual:.2g} of the largest > {ENERGY_BOUND:g}: the time step does not resolve the motion, "
+        "or something snaps; try a smaller time_step"
+    ]
 
 
 def _settings(job: Job, grid: TimeGrid) -> dict[str, Any]:

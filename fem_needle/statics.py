@@ -81,32 +81,41 @@ def solve_static(plant: Plant, *, depth: float, time: float = 0.0) -> Equilibriu
     if depth < plant.smallest_depth:
         return _straight(plant, depth, time, case)
     operators, points = plant.operators(depth, time), plant.points(depth)
-    coordinates, forces = static_state(plant, operators, points, case, depth=depth, time=time)
-    rounding = ROUNDING * float(np.max(np.abs(operators.stiffness)) * np.max(np.abs(coordinates)))
-    return check_force_sum(equilibrium(plant, depth, time, operators, points, coordinates, forces), points, rounding)
+    state = _supported_state(plant, operators, points, case, depth=depth, time=time)
+    rounding = 0.0
+    if operators.beam is None:
+        rounding = ROUNDING * float(np.max(np.abs(operators.stiffness)) * np.max(np.abs(state[0])))
+    return check_force_sum(_equilibrium(plant, depth, time, operators, *state), points, rounding)
 
 
 def static_state(
     plant: Plant, operators: Operators, points: Points, case: LoadCase, *, depth: float, time: float
 ) -> tuple[Array, Array]:
     """Return coordinates and point forces of the equilibrium under a load case; depth and time are for messages."""
+    return _supported_state(plant, operators, points, case, depth=depth, time=time)[:2]
+
+
+def _supported_state(
+    plant: Plant, operators: Operators, points: Points, case: LoadCase, *, depth: float, time: float
+) -> tuple[Array, Array, Array]:
+    """Return coordinates, point forces and what the clamped coordinates' equations lack."""
     guides, known = points.guides, known_coordinates(plant, case)
-    force = points.rows[guides:].T @ case.forces - banded.multiply(operators.stiffness, known)
+    resisted = banded.multiply(operators.tissue, known)  # a straight needle has no bending
+    force = points.rows[guides:].T @ case.forces - resisted
     gap = points.rows[:guides] @ known + points.flexibility[:guides, guides:] @ case.forces
     try:
-        free, guide_forces = solve_guided(plant, operators, points, force, gap)
+        free, guide_forces, support = _solve_supported(plant, operators, points, force, gap)
     except (banded.SingularMatrixError, np.linalg.LinAlgError) as error:
         raise ComputationError(
             f"no static solution at time {time:g} s, depth {depth:g} m: {error}; check stiffnesses and use fewer elements"
         ) from error
-    return known + free, np.concatenate([guide_forces, case.forces])
+    forces, clamped = np.concatenate([guide_forces, case.forces]), plant.prescribed
+    return known + free, forces, support + resisted[:clamped] - points.rows[:, :clamped].T @ forces
 
 
 def known_coordinates(plant: Plant, case: LoadCase) -> Array:
-    """Return the coordinates with the clamp's values in place and zero elsewhere."""
-    known = np.zeros(plant.size)
-    known[: plant.prescribed] = case.clamp[: plant.prescribed]
-    return known
+    """Return the coordinates of the straight needle that stands as the clamp does."""
+    return plant.straight(*(float(value) for value in (*case.clamp[: plant.prescribed], 0.0, 0.0)[:2]))
 
 
 def solve_guided(
@@ -116,32 +125,33 @@ def solve_guided(
 
     Returns x (zero at the clamp) and the guide forces R [N] on the needle.
     """
+    return _solve_supported(plant, operators, points, force, gap)[:2]
+
+
+def _solve_supported(
+    plant: Plant, operators: Operators, points: Points, force: Array, gap: Array
+) -> tuple[Array, Array, Array]:
+    """Return also K x in the clamp's rows."""
     clamped, guides = plant.prescribed, points.guides
     rows = points.rows[:guides, clamped:]
-    answers = operators.stiffness_factorization.solve(np.column_stack([force[clamped:], rows.T]))
+    answers, support = operators.stiffness_factorization.solve_supported(np.column_stack([force[clamped:], rows.T]))
     result = np.zeros(plant.size)
     result[clamped:] = answers[:, 0]
     if not guides:
-        return result, np.zeros(0)
+        return result, np.zeros(0), support[:, 0]
     reached = answers[:, 1:]
     compliance = rows @ reached + points.flexibility[:guides, :guides] + np.diag(points.guide_compliance)
     reactions = np.asarray(np.linalg.solve(compliance, -(rows @ answers[:, 0] + gap)), dtype=float)
     result[clamped:] += reached @ reactions
-    return result, reactions
+    return result, reactions, support[:, 0] + support[:, 1:] @ reactions
 
 
-def equilibrium(
-    plant: Plant,
-    depth: float,
-    time: float,
-    operators: Operators,
-    points: Points,
-    coordinates: Array,
-    forces: Array,
+def _equilibrium(
+    plant: Plant, depth: float, time: float, operators: Operators, coordinates: Array, forces: Array, support: Array
 ) -> Equilibrium:
     """Collect a static state and the reactions that follow from it."""
-    residual = banded.multiply(operators.stiffness, coordinates) - points.rows.T @ forces
-    hub_force, hub_moment = plant.clamp_reactions(residual, depth)
+    hub_force, hub_moment = plant.clamp_reactions(support, depth)
+    guides = plant.points(depth).guides
     tissue = -plant.deflection_at_one @ banded.multiply(operators.tissue, coordinates)
     return Equilibrium(
         plant,
@@ -149,7 +159,7 @@ def equilibrium(
         time,
         coordinates,
         forces,
-        forces[: points.guides],
+        forces[:guides],
         hub_force,
         hub_moment,
         float(tissue),

@@ -39,6 +39,7 @@ class ProjectedNeedle:
     """
 
     axial_force_acts = True
+    stiffness_round_off = 0.0
     has_table = False
 
     def __init__(self, needle: FiniteElementNeedle, basis: Basis) -> None:

@@ -169,7 +169,7 @@ def solve_level(setting: Setting, make: Callable[[], Plant], value: float) -> Le
         size = float(run.summary["time_step"]) if setting.over == "time-step" else 1.0 / value
         steps = int(run.summary["steps"])
     seconds = clock.perf_counter() - started
-    floor = sqrt(steps) * _largest_round_off(setting.scene, plant, times, tips)  # the steps' round-off adds up as a random walk
+    floor = sqrt(steps) * _largest_round_off(setting, plant, times, tips)  # the steps' round-off adds up as a random walk
     return Level(value, size, plant, times, tips, shape, floor, seconds)
 
 
@@ -194,11 +194,12 @@ def size_of(plant: Plant) -> tuple[str, int]:
     return next(((key, int(description[key])) for key in ("modes", "elements") if key in description), ("", 0))
 
 
-def _largest_round_off(scene: Scene, plant: Plant, times: Array, tips: Array) -> float:
+def _largest_round_off(setting: Setting, plant: Plant, times: Array, tips: Array) -> float:
     """Return the largest round-off among some instants, each by the share of its tip in the largest."""
-    law, largest = depth_law(scene), float(np.max(np.abs(tips))) or 1.0
+    law, largest = depth_law(setting.scene), float(np.max(np.abs(tips))) or 1.0
+    stepped = setting.times is None
     chosen = np.unique(np.linspace(0, len(times) - 1, ROUND_OFF_INSTANTS).astype(int)).tolist()
-    found = [abs(tips[row]) / largest * round_off(plant, law.depth(times[row]), times[row]) for row in chosen]
+    found = [abs(tips[row]) / largest * round_off(plant, law.depth(times[row]), times[row], stepped=stepped) for row in chosen]
     return float(max(found))
 
 

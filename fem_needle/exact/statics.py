@@ -82,8 +82,10 @@ class PiecewiseStatics:
 
     @property
     def tissue_force(self) -> float:
-        """Total lateral force of the tissue on the needle, -int k w dy [N]."""
-        return 0.0 if self.solution is None else self.solution.foundation_force
+        """Total lateral force of the tissue on the needle, -int k w dy and that of a tip spring [N]."""
+        if self.solution is None:
+            return 0.0
+        return self.solution.foundation_force - tip_stiffness(self.scene, self.time) * self.tip_deflection
 
     @property
     def hub_force(self) -> float:
@@ -114,7 +116,7 @@ def exact_static(scene: Scene, depth: float, time: float = 0.0) -> PiecewiseStat
     Parameters
     ----------
     scene
-        Any support, layers, guides and loads; straight rest line.
+        Any fixed support, layers, guides and loads; straight rest line.
     depth
         Inserted length z [m], 0 to the length of the needle.
     time
@@ -128,7 +130,7 @@ def exact_static(scene: Scene, depth: float, time: float = 0.0) -> PiecewiseStat
     Raises
     ------
     SceneError
-        If the depth is not on the needle, or the hub has passed a guide or a lateral force.
+        If the depth is not on the needle, the hub has passed a guide or a lateral force, or is free to turn.
     """
     if scene.support.kind == "entry" and depth == 0.0:
         return PiecewiseStatics(scene, depth, time, tip_force(scene, depth, time), 0.0, (), None)
@@ -180,6 +182,7 @@ def beam_problem(scene: Scene, depth: float, time: float) -> BeamProblem:
     point_force = np.array([sum(force for y, force in forces if y == at) for at in breaks], dtype=float)
     spring = np.array([sum(value for y, value in springs if y == at) for at in breaks], dtype=float)
     point_force[-1] += tip_force(scene, depth, time)
+    spring[-1] += tip_stiffness(scene, time)
     return BeamProblem(
         bending_stiffness=scene.needle.bending_stiffness,
         breaks=breaks,
@@ -202,6 +205,11 @@ def foundation_modulus(scene: Scene, y: float, time: float) -> float:
     return sum(layer.foundation_modulus for layer in scene.tissue.layers if layer.holds(y)) * factor
 
 
+def tip_stiffness(scene: Scene, time: float) -> float:
+    """Stiffness of the spring that travels with the tip [N/m], 0 without one."""
+    return (scene.tissue.tip_stiffness or 0.0) * as_function(scene.tissue.stiffness_factor).value(time)
+
+
 def tip_force(scene: Scene, depth: float, time: float) -> float:
     """Sum of the tip forces [N]: given ones, and bevel coefficient times k at the tip."""
     return sum(_tip_load_force(load, scene, depth, time) for load in scene.loads if isinstance(load, TipLoad))
@@ -220,6 +228,8 @@ def _lateral_forces(scene: Scene, time: float) -> list[tuple[float, float]]:
 
 
 def _refuse_impossible(scene: Scene, depth: float) -> None:
+    if scene.support.kind == "hub" and scene.support.hub_rotation == "free":
+        raise SceneError("support.hub_rotation: the exact solution clamps the hub (got 'free'; allowed 'fixed')")
     length = scene.needle.length
     smallest_open = scene.support.kind == "entry"
     if not (0.0 < depth <= length if smallest_open else 0.0 <= depth <= length):

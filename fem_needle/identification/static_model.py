@@ -51,15 +51,16 @@ class _Change:
 
     Attributes
     ----------
-    stiffness
-        dK/dp, band.
+    tissue, bending
+        dG/dp and dK/dp, band.
     forces, clamp
         df/dp of the loads, and of the hub's place.
     softness
         d(1/EI)/dp by 1/EI: of the kinks that a force makes inside an element.
     """
 
-    stiffness: Array | None = None
+    tissue: Array | None = None
+    bending: Array | None = None
     forces: Array | None = None
     clamp: Array | None = None
     softness: float = 0.0
@@ -87,7 +88,9 @@ def exact_rule(scene: Scene, path: str) -> Rule | None:
         return _modulus_rule(scene, int(keys[2]))
     if path in {"needle.bending_stiffness", "needle.youngs_modulus"}:
         value = float(getattr(scene.needle, keys[1]))
-        return None if scene.support.guides else lambda at, plant: _Change(at.operators.bending / value, softness=-1.0 / value)
+        if scene.support.guides:
+            return None
+        return lambda at, plant: _Change(bending=at.operators.bending / value, softness=-1.0 / value)
     if keys[0] == "loads" and keys[-1] in {"force", "bevel_coefficient"}:
         return _load_rule(scene, int(keys[1]), keys[-1])
     if path in {"support.hub_deflection", "support.hub_angle"} and scene.support.kind == "hub":
@@ -108,7 +111,7 @@ def _modulus_rule(scene: Scene, layer: int) -> Rule:
             forces[-1] = at.factor * sum(
                 (load.bevel_coefficient or 0.0) * cosine for load, cosine in zip(bevels, turned, strict=True)
             )
-        return _Change(at.factor * plant.foundation.unit_stiffness(layer, at.place.depth), forces)
+        return _Change(at.factor * plant.foundation.unit_stiffness(layer, at.place.depth), forces=forces)
 
     return change
 
@@ -232,17 +235,22 @@ def _instant(scene: Scene, plant: BeamNeedle, place: Place) -> _Instant:
 def _moved_instant(first: _Instant, changes: Sequence[_Change], steps: Array) -> _Instant:
     """Return an instant after the parameters have changed by some steps."""
     operators, case, points = first.operators, first.case, first.points
-    stiffness, forces, clamp = operators.bending, case.forces, case.clamp
+    tissue, bending, forces, clamp = operators.tissue, operators.bending, case.forces, case.clamp
     softness = 0.0
     for change, step in zip(changes, steps, strict=True):
-        stiffness = stiffness if change.stiffness is None else stiffness + step * change.stiffness
+        tissue = tissue if change.tissue is None else tissue + step * change.tissue
+        bending = bending if change.bending is None else bending + step * change.bending
         forces = forces if change.forces is None else forces + step * change.forces
         clamp = clamp if change.clamp is None else clamp + step * change.clamp
         softness += step * change.softness
     if softness:  # B is proportional to 1 / EI = 1 / (EI_0 (1 + step / EI_0))
         points = replace(points, flexibility=points.flexibility / (1.0 - softness))
+    flexible = operators.beam if bending is operators.bending else None
     return replace(
-        first, operators=replace(operators, bending=stiffness), case=replace(case, forces=forces, clamp=clamp), points=points
+        first,
+        operators=replace(operators, tissue=tissue, bending=bending, beam=flexible),
+        case=replace(case, forces=forces, clamp=clamp),
+        points=points,
     )
 
 
@@ -253,9 +261,10 @@ def _moved_state(at: _Instant, plant: BeamNeedle, change: _Change, coordinates: 
     still = np.zeros(2)
     clamp = still if change.clamp is None else change.clamp
     known = known_coordinates(plant, LoadCase(forces, forces, clamp, still, still))
-    force = points.rows[guides:].T @ forces - banded.multiply(at.operators.stiffness, known)
-    if change.stiffness is not None:
-        force = force - banded.multiply(change.stiffness, coordinates)
+    force = points.rows[guides:].T @ forces - banded.multiply(at.operators.tissue, known)
+    for changed in (change.tissue, change.bending):
+        if changed is not None:
+            force = force - banded.multiply(changed, coordinates)
     gap = points.rows[:guides] @ known + points.flexibility[:guides, guides:] @ forces
     free, reactions = solve_guided(plant, at.operators, points, force, gap)
     return known + free, np.concatenate([reactions, forces])

@@ -98,7 +98,7 @@ def test_time_steps_with_units(converge, tmp_path):
     ("requirement", "message"),
     [
         (("--require-rate", "4.5"), "--require-rate: it is 3.99"),
-        (("--require-error", "1e-12"), "--require-error: it is 5.87e-09, required at most 1e-12"),
+        (("--require-error", "1e-12"), "--require-error: it is 5.86e-09, required at most 1e-12"),
     ],
 )
 def test_what_is_required_and_missed_fails_after_the_files_are_written(converge, tmp_path, requirement, message):

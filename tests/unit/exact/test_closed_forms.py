@@ -4,7 +4,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from fem_needle import SceneError
 from fem_needle.exact import ClampedTipForce, InfiniteBeam, SemiInfiniteBeam, exact_static
+from tests.consistency.scenes import LENGTH, STIFFNESS, held, scene_of
 
 
 def mp_clamped_tip(stiffness, modulus, length, force):
@@ -63,3 +65,16 @@ def test_two_half_beams_make_a_whole_one():
     whole = InfiniteBeam(bending_stiffness=0.02, foundation_modulus=2e4, force=1.0)
     half = SemiInfiniteBeam(bending_stiffness=0.02, foundation_modulus=2e4, force=0.5)
     assert whole.deflection(0.0) == pytest.approx(0.5 * half.tip_deflection, rel=1e-15)
+
+
+def test_a_tip_spring_joins_the_needle_s_own_stiffness():
+    scene = scene_of("hub", held(0.1), layers=(), tissue={"kind": "tip-spring", "tip_stiffness": 50.0})
+    rest = exact_static(scene, 0.1)
+    assert rest.tip_deflection == pytest.approx(0.1 / (3.0 * STIFFNESS / LENGTH**3 + 50.0), rel=1e-12)
+    assert rest.hub_force + rest.tissue_force + rest.tip_force == pytest.approx(0.0, abs=1e-13)
+
+
+def test_a_free_hub_is_refused():
+    scene = scene_of("hub", held(0.1), support={"hub_rotation": "free", "hub_rotational_inertia": 1e-6})
+    with pytest.raises(SceneError, match=r"support\.hub_rotation: the exact solution clamps the hub"):
+        exact_static(scene, 0.1)
