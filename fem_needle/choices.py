@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
 from fem_needle.inertia_effect import POINTS_PER_PERIOD, inertia_effect
+from fem_needle.limits import check_samples
 from fem_needle.modal_stepper import needs_no_steps, vibrating_tips
 from fem_needle.motion import PUSH_SLACK, depth_law, run_duration, shortest_period
 from fem_needle.plant import Plant
@@ -60,6 +61,7 @@ def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
     numerics = scene.numerics
     duration = run_duration(scene)
     step = numerics.output_step if isinstance(numerics.output_step, float) else likely_duration(scene) / OUTPUTS
+    check_samples(duration, step, stations=numerics.output_points)
     if step > duration:
         raise SceneError(f"numerics.output_step: longer than the run (got {step:g}; allowed up to {duration:g} s)")
     analysis, skipped, effect, leaves_out = numerics.analysis, tuple(unneeded_terms(scene)), 1.0, False

@@ -19,6 +19,7 @@ from scipy.linalg import eigh
 
 from fem_needle import banded
 from fem_needle.free_response import frozen_matrices, ringing
+from fem_needle.limits import check_swings
 from fem_needle.march import TimeGrid, march
 from fem_needle.motion import DepthLaw, depth_law, landing_times, run_duration, shortest_period
 from fem_needle.plant import Operators, Plant
@@ -81,6 +82,7 @@ def _pilot(plant: Plant) -> list[_Piece]:
     """Run without inertia and split the samples at the kinks."""
     scene, law, duration = plant.scene, depth_law(plant.scene), run_duration(plant.scene)
     step = min(duration / PILOT_POINTS, shortest_period(scene) / POINTS_PER_PERIOD)
+    check_swings(duration, shortest_period(scene))
     landings = landing_times(scene, law, duration, plant.smallest_depth)
     marks = _apart([0.0, *landings, duration], SLIVER * duration)
     outputs = [0.0]

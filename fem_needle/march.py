@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -14,12 +15,15 @@ from fem_needle.banded import SingularMatrixError
 from fem_needle.errors import ComputationError
 from fem_needle.initial import initial_state
 from fem_needle.ledger import StepEnd, Works, energies, landing_works, row_correction, step_works
+from fem_needle.limits import check_samples, check_steps
 from fem_needle.motion import DepthLaw, Motion, depth_law, landing_times, run_duration
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample, sample_step
 from fem_needle.scene import Scene
 from fem_needle.stages import trivial_solution
 from fem_needle.steppers import Step, Stepper
+
+AT_ONCE = 4096  # times
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,11 @@ class TimeGrid:
         for start, end in pairwise(marks):
             yield start, end, max(1, ceil((end - start) / self.time_step - 1e-9))
 
+    def has_landing(self, time: float, distance: float) -> bool:
+        """Return whether there is a landing within a distance of a time [s]."""
+        first = bisect_left(self.landings, time - distance)
+        return first < len(self.landings) and self.landings[first] <= time + distance
+
     @property
     def steps(self) -> int:
         """Number of steps."""
@@ -66,6 +75,8 @@ def output_times(duration: float, output_step: float) -> tuple[float, ...]:
 def time_grid(plant: Plant, time_step: float, output_step: float) -> TimeGrid:
     """Return the times of a scene's run."""
     duration = run_duration(plant.scene)
+    check_steps(duration, time_step)
+    check_samples(duration, output_step, plant.size, plant.scene.numerics.output_points)
     landings = landing_times(plant.scene, depth_law(plant.scene), duration, plant.smallest_depth)
     outputs = output_times(duration, output_step)
     # An output within round-off of a landing is moved onto it: no steps of 1e-17 s, no kink inside a step.
@@ -74,7 +85,16 @@ def time_grid(plant: Plant, time_step: float, output_step: float) -> TimeGrid:
 
 
 def _snapped(time: float, landings: tuple[float, ...], distance: float) -> float:
-    return next((landing for landing in landings if abs(landing - time) <= distance), time)
+    first = bisect_left(landings, time - distance)
+    return landings[first] if first < len(landings) and landings[first] <= time + distance else time
+
+
+def equal_times(start: float, end: float, count: int) -> Iterator[float]:
+    """Yield ``count`` + 1 equally spaced times, those of `numpy.linspace` to the last bit; never all in memory."""
+    step = (end - start) / count
+    for first in range(0, count, AT_ONCE):
+        yield from (np.arange(first, min(first + AT_ONCE, count)) * step + start).tolist()
+    yield end
 
 
 @dataclass(frozen=True)
@@ -96,9 +116,7 @@ def march(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample, N
     law, landings, outputs = depth_law(plant.scene), set(grid.landings) | {0.0}, set(grid.outputs)
     run = started(plant, stepper, law)
     for start, end, count in grid.intervals():
-        times = np.linspace(start, end, count + 1)
-        times[-1] = end
-        for time, until in pairwise(times.tolist()):
+        for time, until in pairwise(equal_times(start, end, count)):
             if time in landings:
                 run.land(until, counted=time > 0.0)
             run.step(until)

@@ -137,6 +137,7 @@ def _contents(path: Path) -> tuple[Array, list[str], Integers]:
     limit = SECONDS + path.stat().st_size / BYTES_PER_SECOND
     command = [sys.executable, "-P", str(READER), str(path.resolve())]
     surroundings = os.environ | {"PYTHONPATH": os.pathsep.join(entry for entry in sys.path if entry)}
+    surroundings["OPENBLAS_NUM_THREADS"] = "1"  # each thread would take of the memory that the reader may have
     try:
         done = subprocess.run(
             command, env=surroundings, stdin=subprocess.DEVNULL, capture_output=True, timeout=limit, check=False

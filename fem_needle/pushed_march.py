@@ -12,6 +12,7 @@ from fem_needle.banded import SingularMatrixError
 from fem_needle.errors import ComputationError
 from fem_needle.initial import initial_state
 from fem_needle.ledger import Works, jump_works, landing_works, row_correction, step_works
+from fem_needle.limits import check_steps
 from fem_needle.march import RunEnd, TimeGrid, row_change
 from fem_needle.motion import depth_law, shortest_period
 from fem_needle.plant import Plant
@@ -176,8 +177,10 @@ def march_pushed(plant: Plant, stepper: DynamicStepper, grid: TimeGrid) -> Gener
     ComputationError
         If a step cannot be solved; says at which time and depth.
     """
+    check_steps(grid.outputs[-1], shortest_period(plant.scene) / STEPS_PER_PERIOD)
     first, end, count = next(grid.intervals())
     run = started_push(plant, stepper, (end - first) / count)
+    outputs = set(grid.outputs)
     for start, end, count in grid.intervals():
         length = min((end - start) / count, shortest_period(plant.scene) / STEPS_PER_PERIOD)
         while run.time < end - 1e-12 * length:
@@ -188,7 +191,7 @@ def march_pushed(plant: Plant, stepper: DynamicStepper, grid: TimeGrid) -> Gener
             if reason is not None:
                 yield run.sample()
                 return RunEnd(reason, run.steps)
-        if end in grid.outputs:
+        if end in outputs:
             yield run.sample()
     return RunEnd("duration", run.steps)
 

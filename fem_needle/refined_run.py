@@ -17,6 +17,7 @@ from fem_needle.choices import likely_duration, longest_period
 from fem_needle.detuning import detuning
 from fem_needle.errors import ComputationError
 from fem_needle.expectation import Expectation, expectation
+from fem_needle.limits import check_steps
 from fem_needle.march import RunEnd, TimeGrid, time_grid
 from fem_needle.motion import shortest_period
 from fem_needle.run_job import Job, begin, collect, shown, stepper_of, total_error, trajectory_of
@@ -315,6 +316,7 @@ def sampled_grid(job: Job, step: float) -> TimeGrid:
     Long steps skip outputs, short ones divide them evenly.
     """
     output, duration = job.choice.output_step, likely_duration(job.scene)
+    check_steps(duration, step)
     grid = time_grid(job.plant, output, output)
     if step >= output * (1 - 1e-9):
         every = max(1, floor(step / output * (1 + 1e-9)))
@@ -326,8 +328,7 @@ def sampled_grid(job: Job, step: float) -> TimeGrid:
     for start, end in pairwise(grid.outputs):
         count = max(1, ceil((end - start) / output * samples - 1e-9))
         inner = np.linspace(start, end, count + 1)[1:-1].tolist()
-        near = 1e-9 * output
-        times += [time for time in inner if all(abs(time - landing) > near for landing in grid.landings)]
+        times += [time for time in inner if not grid.has_landing(time, 1e-9 * output)]
         times.append(end)
     return TimeGrid(tuple(times), grid.landings, output / (samples * between))
 

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.hdf5_guard import check_hdf5
 from fem_needle.scene.steering import signal_description
 from fem_needle.trajectory import VARIABLES, Trajectory
 
@@ -87,10 +88,11 @@ def read_series(path: Path) -> dict[str, Array]:
     Raises
     ------
     OSError
-        If there is no such file, or it is damaged or not netCDF-4.
+        If there is no such file, it is damaged or not netCDF-4, leads to other files or is too large.
     """
     # With h5py: h5netcdf leaves a traceback on stderr where it cannot open a file.
     try:
+        check_hdf5(path)
         with h5py.File(path, "r") as file:
             return {name: np.asarray(item[...], dtype=float) for name, item in file.items() if isinstance(item, h5py.Dataset)}
     except (KeyError, RuntimeError, TypeError, ValueError) as error:

@@ -117,10 +117,11 @@ def _repeat(scene: Scene, repetitions: int, target: RunTarget, *, energies: bool
     from fem_needle.cli.steer_table import repeat_rows
     from fem_needle.closed_loop.repeated_picture import repeated_picture
     from fem_needle.closed_loop.repeating import repeat as compute
+    from fem_needle.limits import MOST_REPETITIONS
     from fem_needle.study_files import StudyFolder
 
-    if repetitions < 1:
-        raise SceneError(f"--repeat: too few (got {repetitions}; allowed 1 or more)")
+    if not 1 <= repetitions <= MOST_REPETITIONS:
+        raise SceneError(f"--repeat: out of range (got {repetitions}; allowed 1 to {MOST_REPETITIONS})")
     folder = StudyFolder(NAME, target)
     folder.check()
     warned(scene)

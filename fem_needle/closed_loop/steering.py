@@ -18,6 +18,7 @@ from fem_needle.closed_loop.simulation import Simulation, analysis_of, output_st
 from fem_needle.control.build import controller_of
 from fem_needle.control.controller import Controller
 from fem_needle.errors import ComputationError, SuspiciousValueWarning
+from fem_needle.limits import check_readings, check_samples
 from fem_needle.models import build_plant, model_family
 from fem_needle.motion import run_duration
 from fem_needle.plant import Plant
@@ -162,14 +163,23 @@ def steer(
     Where ``numerics.time_step`` is "auto", the commands of a run are replayed with steps of half the length until the tip agrees
     within the tolerance: what is compared is the integration, not decisions that a threshold turns round.
     """
+    _check_readings(scene)
     if controller is None:
         controller = controller_of(scene)
     needle = chosen_plant(scattered(scene, repetition)) if plant is None else plant
     if scene.controller.variant == "fully-actuated":
         return fully_actuated(needle)
     for message in needle.warnings:
-        warnings.warn(message, SuspiciousValueWarning, stacklevel=2)
+        warnings.warn(message, SuspiciousValueWarning, stacklevel=3)
     return _refined(Loop(needle, controller, scene.controller.period, repetition, progress), energies=energies)
+
+
+def _check_readings(scene: Scene) -> None:
+    """Refuse sensors and a controller that are asked more often than a run can hold."""
+    check_samples(run_duration(scene), output_step_of(scene), stations=scene.numerics.output_points)
+    check_readings(run_duration(scene), scene.controller.period, "controller.period")
+    for number, sensor in enumerate(scene.sensors):
+        check_readings(run_duration(scene), sensor.period, f"sensors.{number}.period")
 
 
 def chosen_plant(scene: Scene) -> Plant:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fem_needle.errors import SceneError
 from fem_needle.scene import units
-from fem_needle.scene.table_file import column_numbers, read_text, split_header
+from fem_needle.scene.table_file import column_numbers, csv_rows, read_text, split_header
 from fem_needle.trajectory import VARIABLES
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ def read_measurements(path: str | Path, needed: Mapping[str, str] | None = None)
     """
     source = Path(path).name
     try:
-        rows = [row for row in csv.reader(read_text(Path(path)).splitlines()) if row]
+        rows = csv_rows(read_text(Path(path)))
         header = _header(rows, source, needed or {})
         columns = {name: _column(rows, number, name, source) for number, name in enumerate(header)}
     except (ValueError, csv.Error) as error:

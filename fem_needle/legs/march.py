@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, fields
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from fem_needle.ledger import StepEnd, Works
 from fem_needle.legs.states import Leg
 from fem_needle.legs.works import figures, leg_works, row_corrections
 from fem_needle.loads import LoadCase
-from fem_needle.march import RunEnd, TimeGrid, ends_by_itself, failed_step, pass_landing
+from fem_needle.march import RunEnd, TimeGrid, ends_by_itself, equal_times, failed_step, pass_landing
 from fem_needle.motion import DepthLaw, Instant, depth_law
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample
@@ -91,10 +92,8 @@ def pieces_of(grid: TimeGrid, size: int) -> Iterator[Piece]:
         if start in landings and shown:
             yield Piece(np.array(times), np.array(shown), landed)
             times, shown, landed = [], [], True
-        marks = np.linspace(start, end, count + 1).tolist()
-        marks[-1] = end
         times = times or [start]
-        for number, mark in enumerate(marks[1:], start=1):
+        for number, mark in enumerate(islice(equal_times(start, end, count), 1, None), start=1):
             times.append(mark)
             shown.append(number == count and end in outputs)
             if len(shown) == most:

@@ -61,4 +61,4 @@ def raise_mistakes(title: str, mistakes: Iterable[Mistake]) -> None:
 
 
 def _location(path: str) -> tuple[int | str, ...]:
-    return tuple(int(key) if key.isdigit() else key for key in path.split(".")) if path else ()
+    return tuple(int(key) if key.isdecimal() else key for key in path.split(".")) if path else ()

@@ -73,7 +73,7 @@ def _index(items: list[Any], key: str, path: str) -> int:
     names = [item.get("name") or "" if isinstance(item, dict) else "" for item in items]
     if key and key in names:
         return names.index(key)
-    if key.isdigit() and int(key) < len(items):
+    if key.isdecimal() and int(key) < len(items):
         return int(key)
     known = [name or str(index) for index, name in enumerate(names)]
     raise SceneError(f"{path}: no entry '{key}' (allowed {', '.join(known) or 'none: the list is empty'})")

@@ -14,7 +14,8 @@ from typing import Any
 from fem_needle.scene import units
 
 FILE_KEYS = ("file", "column")
-LARGEST_FILE = 50_000_000
+LARGEST_FILE = 50_000_000  # bytes
+MOST_CELLS = 3_000_000
 
 _HEADER = re.compile(r"\s*([^\[\]]*?)\s*(?:\[([^\[\]]*)\])?\s*")
 
@@ -36,11 +37,12 @@ def read_table(file: str, column: str, folder: Path | None) -> dict[str, Any]:
     ValueError
         If the file is outside the folder, missing, no text, or lacks numbers.
     """
-    lines = read_text(inside_folder(file, folder)).splitlines()
     try:
-        rows = [row for row in csv.reader(lines) if row]
+        rows = csv_rows(read_text(inside_folder(file, folder)))
     except csv.Error as error:
         raise ValueError(f"{file!r} is no CSV: {error}") from None
+    except ValueError as error:
+        raise ValueError(f"{file!r} {error}") from None
     if len(rows) < 3:
         raise ValueError(f"{file!r} needs a header and at least two rows")
     header = [split_header(cell) for cell in rows[0]]
@@ -84,6 +86,22 @@ def read_text(path: Path) -> str:
     if not text.strip():
         raise ValueError(f"{path.name!r} is empty")
     return text
+
+
+def csv_rows(text: str) -> list[list[str]]:
+    """Return the rows of a CSV text that are not empty.
+
+    Raises
+    ------
+    ValueError
+        If it has more cells than fit into memory, each of which takes some 100 bytes.
+    csv.Error
+        If it is no CSV.
+    """
+    cells = text.count(",") + text.count("\n") + 1
+    if cells > MOST_CELLS:
+        raise ValueError(f"has {cells} cells (allowed up to {MOST_CELLS})")
+    return [row for row in csv.reader(text.splitlines()) if row]
 
 
 def inside_folder(file: str, folder: Path | None) -> Path:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from fem_needle.errors import SceneError
 from fem_needle.run_folder import load_run
 from tests.faults.short_run import SAMPLES, compute, problems
 
@@ -42,6 +43,8 @@ def attempt(folder: Path) -> int | None:
         return compute(folder)
     except KeyboardInterrupt:
         return None
+    except SceneError:  # the folder could not be made
+        return 2
 
 
 def survey(tmp_path, at, error, *, lasting):

@@ -21,10 +21,12 @@ RANKS = {
     "shipped": 0,
     "atomic_file": 0,
     "folder_lock": 0,
+    "hdf5_guard": 0,
+    "limits": 0,
     "threads": 0,
     "vtk_file": 0,
     "mesh_file": 0,
-    "mesh_reader": 0,
+    "mesh_reader": 1,
     # physics and reference elements
     "scene": 1,
     "elements": 3,
