@@ -41,6 +41,13 @@ def cutting_forces(scene: Scene, depths: Array, speeds: Array, deepest: Array) -
     return np.where(advances, tip_values(scene.tissue.layers, depths, lambda layer: layer.cutting_force), 0.0)
 
 
+def cutting_work(scene: Scene, start: float, deepest: Array) -> Array:
+    """Return the work [J] that cutting takes from a depth [m] to deeper ones (T,): each layer's force times the way in it."""
+    ways = [(layer.cutting_force, np.clip([layer.start, layer.far_side], start, None)) for layer in scene.tissue.layers]
+    taken = [force * (np.clip(deepest, first, last) - first) for force, (first, last) in ways if force]
+    return np.asarray(np.sum(taken, axis=0) if taken else np.zeros_like(deepest), dtype=float)
+
+
 @dataclass(frozen=True)
 class Hold:
     """What holds a needle that rests.

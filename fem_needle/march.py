@@ -189,12 +189,12 @@ class Marching:
 
     def _add_works(self, step: Step) -> None:
         works = step_works(step, inertia=self.stepper.inertia)
-        friction = cutting = 0.0
-        scene = self.plant.scene
+        friction, scene = 0.0, self.plant.scene
         for weight, stage in zip(step.method.weights * step.length, step.stages, strict=True):
             depth, speed = stage.instant.depth, stage.instant.speed
             friction += weight * speed * axial.friction_force(scene, depth, speed)
-            cutting += weight * speed * axial.cutting_force(scene, depth, speed, self.deepest)
+        reached = max(self.deepest, self.law.depth(step.ends[1].stage.instant.time))
+        cutting = float(axial.cutting_work(scene, self.deepest, np.array(reached)))
         self.works = self.works + replace(works, friction_dissipation=friction, cutting_work=cutting)
 
 

@@ -126,10 +126,9 @@ def _all_works(scene: Scene, leg: Leg, last_length: float, deepest: float) -> di
     depths, speeds = leg.instants.depths[leg.nodes], leg.instants.speeds[leg.nodes]
     weights = leg.method.weights * leg.lengths[:, None] * speeds
     friction = np.sum(weights * axial.friction_force(scene, depths, speeds), axis=1)
-    cutting = np.sum(weights * axial.cutting_forces(scene, depths, speeds, _deepest(leg, deepest)[:-1, None]), axis=1)
     return {field.name: getattr(works, field.name) for field in fields(works)} | {
         "friction_dissipation": np.append(0.0, np.cumsum(friction)),
-        "cutting_work": np.append(0.0, np.cumsum(cutting)),
+        "cutting_work": axial.cutting_work(scene, deepest, _deepest(leg, deepest)),
     }
 
 

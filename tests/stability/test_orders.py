@@ -34,8 +34,8 @@ def test_order(name, case):
 def written():
     """Cells of the document's table by the integrator's name."""
     section = DOCUMENT.read_text(encoding="utf-8").split("## Orders of the integrators")[1].split("\n## ")[0]
-    lines = [line.strip().removeprefix("|").removesuffix("|").split("|") for line in section.splitlines() if line.startswith("| ")]
-    lines = [[cell.strip() for cell in line] for line in lines]
+    lines = [line.strip() for line in section.splitlines() if line.startswith("| ")]
+    lines = [[cell.strip() for cell in line.removeprefix("|").removesuffix("|").split("|")] for line in lines]
     return {cells[0]: cells[1:] for cells in lines if re.fullmatch(r"\d", cells[1])}
 
 
