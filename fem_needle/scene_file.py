@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,6 +14,10 @@ from fem_needle.errors import SceneError
 from fem_needle.scene import Scene
 from fem_needle.scene.table_file import read_text
 from fem_needle.shipped import shipped_names, shipped_path
+
+MOST_KEYS = 100_000
+MOST_PARTS = 16  # of a dotted key
+_INNER_PART = re.compile(r"""\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+(?=\.)""")
 
 
 def load_scene(name_or_path: str | Path) -> Scene:
@@ -62,10 +67,21 @@ def parse_scene(text: str, folder: Path | None = None) -> Scene:
 def _toml(text: str) -> dict[str, Any]:
     if not text.strip():
         raise SceneError("scene: is empty")
+    _check_size(text)
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise SceneError(f"scene: is not TOML: {error}") from None
+
+
+def _check_size(text: str) -> None:
+    """Refuse what would take unbounded memory to parse: a key of many parts costs the square of their number."""
+    for mark, what in (("=", "keys"), ("[", "tables and lists")):
+        if text.count(mark) > MOST_KEYS:
+            raise SceneError(f"scene: has {text.count(mark)} {what} (allowed up to {MOST_KEYS})")
+    deepest = max((len(_INNER_PART.findall(line)) + 2 for line in text.split("\n")), default=0)
+    if deepest > MOST_PARTS:
+        raise SceneError(f"scene: has a key of {deepest} parts (allowed up to {MOST_PARTS})")
 
 
 def scene_text(scene: Scene) -> str:

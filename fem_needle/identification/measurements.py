@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 LARGEST_NUMBER = 1e30  # SI: squares of it must not overflow
 MOST_COLUMNS = 1000
 FEWEST_ROWS = 2
+LONGEST_LINE, MOST_MISTAKES = 300, 50  # of a message
 SPACING_TOLERANCE = 0.05  # of the mean interval: times written with few digits count as equally spaced, 30 Hz in whole ms
 
 # SI units of the names that a run has too: whatever unit is written must have the same dimension.
@@ -99,7 +100,8 @@ def read_measurements(path: str | Path, needed: Mapping[str, str] | None = None)
         header = _header(rows, source, needed or {})
         columns = {name: _column(rows, number, name, source) for number, name in enumerate(header)}
     except (ValueError, csv.Error) as error:
-        raise error if isinstance(error, SceneError) else SceneError(f"{source}: {error}") from None
+        mistakes = error.mistakes if isinstance(error, SceneError) else (f"{source}: {error}",)
+        raise SceneError([line[:LONGEST_LINE] for line in mistakes[:MOST_MISTAKES]]) from None
     found = Measurements({name: np.array([unit.to_si(x) for x in columns[name]]) for name, unit in header.items()}, source)
     _check_times(found)
     return found

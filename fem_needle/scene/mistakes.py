@@ -16,6 +16,8 @@ from fem_needle.scene.time_quantity import SINUSOID_KEYS, TABLE_KEYS
 
 Location = tuple[int | str, ...]
 
+MOST_MISTAKES = 100  # that are told
+
 # By the type of pydantic's error; what is not here already speaks for itself.
 _NOT_A_TABLE = "is not a table of keys (got {value})"
 _TEMPLATES = {
@@ -26,6 +28,7 @@ _TEMPLATES = {
     "model_type": _NOT_A_TABLE,
     "model_attributes_type": _NOT_A_TABLE,
     "dict_type": _NOT_A_TABLE,
+    "too_long": "has too many entries (got {actual_length}; allowed up to {max_length})",
     "tuple_type": "is not a list (got {value})",
     "string_type": "is not a text (got {value})",
 }
@@ -34,11 +37,13 @@ _TEMPLATES = {
 def mistake_lines(error: ValidationError, root: type[Part]) -> tuple[str, ...]:
     """Return one line for each mistake of a validation of ``root``."""
     lines = []
-    for detail in error.errors(include_url=False):
+    details = error.errors(include_url=False)
+    for detail in details[:MOST_MISTAKES]:
         location = tuple(detail["loc"])
         path = ".".join(str(key) for key in without_tags(location)) or "scene"
         lines.append(f"{path}: {_message(dict(detail), location, root)}")
-    return tuple(dict.fromkeys(lines))
+    more = [f"scene: and {len(details) - MOST_MISTAKES} more mistakes"] if len(details) > MOST_MISTAKES else []
+    return tuple(dict.fromkeys(lines + more))
 
 
 def without_tags(location: Location) -> Location:

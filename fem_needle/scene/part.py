@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 MISTAKE = "mistake"
+MOST_ENTRIES = 1000  # of a list of parts: they are compared with each other
 
 
 class Part(BaseModel):
@@ -41,7 +42,10 @@ class Mistake(NamedTuple):
 
 def shown(value: Any) -> str:
     """Return a short text of a value for a message."""
-    text = f"{value:.12g}" if isinstance(value, float) else repr(value)
+    try:
+        text = f"{value:.12g}" if isinstance(value, float) else repr(value)
+    except RecursionError:
+        text = "tables in tables without end"
     return text if len(text) <= 60 else text[:57] + "..."
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import StrictStr, ValidationError, model_validator
+from pydantic import Field, StrictStr, ValidationError, model_validator
 
 from fem_needle.errors import SceneError
 from fem_needle.scene.cross_checks import cross_mistakes
@@ -14,7 +14,7 @@ from fem_needle.scene.insertion import Insertion
 from fem_needle.scene.loads import Load
 from fem_needle.scene.mistakes import check_path, mistake_lines
 from fem_needle.scene.needle import Needle
-from fem_needle.scene.part import Part, raise_mistakes, shown
+from fem_needle.scene.part import MOST_ENTRIES, Part, raise_mistakes, shown
 from fem_needle.scene.plain_data import plain, with_entry
 from fem_needle.scene.quantity import Quantity
 from fem_needle.scene.settings import Friction, Initial, Model, Numerics, Run
@@ -41,10 +41,10 @@ class Scene(Part):
     tissue: Tissue
     insertion: Insertion
     friction: Friction = Friction()
-    loads: tuple[Load, ...] = ()
+    loads: Annotated[tuple[Load, ...], Field(max_length=MOST_ENTRIES)] = ()
     initial: Initial = Initial()
     target: Target = Target()
-    sensors: tuple[Sensor, ...] = ()
+    sensors: Annotated[tuple[Sensor, ...], Field(max_length=MOST_ENTRIES)] = ()
     controller: Controller = Controller()
     actuators: Actuators = Actuators()
     scatter: Scatter = Scatter()

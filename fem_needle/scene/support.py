@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from fem_needle.scene.part import Mistake, Part, raise_mistakes
+from fem_needle.scene.part import MOST_ENTRIES, Mistake, Part, raise_mistakes
 from fem_needle.scene.quantity import Quantity
 from fem_needle.scene.time_quantity import TimeQuantity, TimeValue
 
@@ -56,7 +56,7 @@ class Support(Part):
     hub_rotation: Literal["fixed", "free"] = "fixed"
     hub_torque: Annotated[TimeValue, TimeQuantity("N m")] = 0.0
     hub_rotational_inertia: Annotated[float | None, Quantity("kg m^2", above=0.0, optional=True)] = None
-    guides: tuple[Guide, ...] = ()
+    guides: Annotated[tuple[Guide, ...], Field(max_length=MOST_ENTRIES)] = ()
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -7,9 +7,9 @@ from itertools import combinations
 from math import inf
 from typing import Annotated, Literal, Self
 
-from pydantic import StrictStr, model_validator
+from pydantic import Field, StrictStr, model_validator
 
-from fem_needle.scene.part import Mistake, Part, raise_mistakes
+from fem_needle.scene.part import MOST_ENTRIES, Mistake, Part, raise_mistakes
 from fem_needle.scene.quantity import Quantity
 from fem_needle.scene.time_quantity import TimeQuantity, TimeValue
 
@@ -84,7 +84,7 @@ class Tissue(Part):
     tip_stiffness: Annotated[float | None, Quantity("N/m", at_least=0.0, optional=True)] = None
     rest_line: Literal["straight", "cut-path"] = "straight"
     stiffness_factor: Annotated[TimeValue, TimeQuantity(at_least=0.0)] = 1.0
-    layers: tuple[Layer, ...] = ()
+    layers: Annotated[tuple[Layer, ...], Field(max_length=MOST_ENTRIES)] = ()
 
     @model_validator(mode="after")
     def _check(self) -> Self:

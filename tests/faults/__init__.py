@@ -1,0 +1,1 @@
+"""Faults of disk, memory and processes, and files that are damaged or hostile."""

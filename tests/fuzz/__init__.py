@@ -1,0 +1,1 @@
+"""Hostile input: scenes, meshes, tables and command lines that nobody would write."""
