@@ -72,7 +72,8 @@ def sample_step(
     friction = axial.friction_force(scene, depth, instant.speed)
     resisting = friction + axial.cutting_force(scene, depth, instant.speed, deepest)
     axial_force = axial_force_at(plant, step, at_start=at_start, inertia=inertia)
-    (hub_force, hub_moment), tissue = _reactions(plant, step, end, at_start=at_start, inertia=inertia)
+    needed, tissue = _reactions(plant, step, end, at_start=at_start, inertia=inertia)
+    hub_force, hub_moment = reactions_of_clamp(plant, needed, depth, solution.forces)
     path_position, path_deflection = (np.zeros(0), np.zeros(0)) if end.path is None else end.path.points()
     return Sample(
         time=instant.time,
@@ -110,8 +111,8 @@ def _ledger_values(end: StepEnd, works: Works, *, inertia: bool) -> dict[str, fl
 
 def _reactions(
     plant: Plant, step: Step, end: StepEnd, *, at_start: bool, inertia: bool
-) -> tuple[tuple[float, float], float]:
-    """Return what the clamp exerts on the needle, (force, moment), and the tissue's total lateral force."""
+) -> tuple[Array, float]:
+    """Return what the coordinates' equations lack, which a clamp gives, and the tissue's total lateral force."""
     stage, solution = end.stage, end.solution
     velocities = solution.velocities
     if not inertia:
@@ -127,8 +128,14 @@ def _reactions(
             tissue = tissue + stage.instant.speed * banded.multiply(stage.operators.drag, solution.coordinates)
     if stage.rest is not None:
         tissue = tissue - stage.factor * stage.rest.load
-    clamp = plant.clamp_reactions(np.asarray(needed), stage.instant.depth)
-    return clamp, -float(plant.deflection_at_one @ tissue)
+    return np.asarray(needed), -float(plant.deflection_at_one @ tissue)
+
+
+def reactions_of_clamp(plant: Plant, residual: Array, depth: float, point_forces: Array) -> tuple[float, float]:
+    """Return force [N] and moment [N m] of the clamp; the surface carries the tip force of a needle that is hardly inserted."""
+    if depth < plant.smallest_depth:
+        return -float(point_forces[-1]), 0.0
+    return plant.clamp_reactions(residual, depth)
 
 
 def _guide_forces(step: Step, end: StepEnd) -> Array:

@@ -29,6 +29,7 @@ GROUPS = (
     "fem_needle.cli.compare",
     "fem_needle.cli.identify",
     "fem_needle.cli.benchmark",
+    "fem_needle.cli.stress",
 )
 ENTRY_POINTS = "fem_needle.commands"
 

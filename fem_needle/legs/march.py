@@ -19,7 +19,7 @@ from fem_needle.loads import LoadCase
 from fem_needle.march import RunEnd, TimeGrid, ends_by_itself, equal_times, failed_step, pass_landing
 from fem_needle.motion import DepthLaw, Instant, depth_law
 from fem_needle.plant import Plant
-from fem_needle.samples import Sample
+from fem_needle.samples import Sample, reactions_of_clamp
 from fem_needle.scene import Scene
 from fem_needle.stages import StageSolution, evaluate_stage
 from fem_needle.steppers import Stepper
@@ -171,7 +171,7 @@ def _sample(
     friction = float(axial.friction_force(scene, depth, speed))
     resisting = friction + axial.cutting_force(scene, depth, speed, deepest)
     axial_force = float(shown["axial_force"]) if plant.axial_force_acts else 0.0
-    hub_force, hub_moment = plant.clamp_reactions(shown["hub_residual"], float(instants.depths[instant]))
+    hub_force, hub_moment = reactions_of_clamp(plant, shown["hub_residual"], depth, leg.forces[instant])
     return Sample(
         time=float(instants.times[instant]),
         depth=depth,

@@ -90,6 +90,7 @@ RANKS = {
     "comparison": 17,
     "control": 17,
     "benchmark": 18,
+    "stress": 18,
     "run_folder": 14,
     "batch": 16,
     "csv_file": 13,

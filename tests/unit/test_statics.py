@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fem_needle import ComputationError, FiniteElementNeedle, solve_static
+from fem_needle import ComputationError, FiniteElementNeedle, run_scene, solve_static
 from fem_needle.scene import Guide, LateralLoad, Table, TipLoad
 from fem_needle.statics import check_force_sum
 from tests.consistency.scenes import GEL, STIFFNESS, held, scene_of
@@ -61,3 +61,10 @@ def test_a_depth_beyond_the_needle_shows_no_nonsense():
     plant = FiniteElementNeedle(scene_of("entry", held(0.2)), elements=4)
     near = solve_static(plant, depth=0.2 * (1 + 1e-15)).tip_deflection
     assert near == pytest.approx(solve_static(plant, depth=0.2).tip_deflection, rel=1e-9)
+
+
+@pytest.mark.parametrize("loop", ["auto", "numpy"])
+def test_the_surface_carries_the_tip_force_of_a_needle_that_is_hardly_inserted(loop):
+    scene = scene_of("entry", held(1e-9), numerics={"analysis": "static", "loop": loop})
+    run = run_scene(scene)
+    assert run.hub_force == pytest.approx(-0.1) and np.all(run.hub_moment == 0.0)
