@@ -59,8 +59,8 @@ def survey(tmp_path, at, error, *, lasting):
 
 EVERY = pytest.mark.slow
 CASES = [
-    pytest.param(KeyboardInterrupt(), False, 3, id="interrupt"),
-    pytest.param(FULL, True, 2, id="full disk"),
+    pytest.param(KeyboardInterrupt(), False, 4, id="interrupt"),
+    pytest.param(FULL, True, 3, id="full disk"),
     pytest.param(KeyboardInterrupt(), False, 1, id="interrupt, every call", marks=EVERY),
     pytest.param(FULL, True, 1, id="full disk, every call", marks=EVERY),
     pytest.param(FULL, False, 1, id="full for a moment, every call", marks=EVERY),
@@ -124,9 +124,9 @@ def check_lines(tmp_path, stride, first):
 
 
 def test_an_interrupt_between_writes(tmp_path):
-    check_lines(tmp_path, stride=131, first=17)
+    check_lines(tmp_path, stride=331, first=117)
 
 
 @pytest.mark.slow
 def test_an_interrupt_at_any_line(tmp_path):
-    check_lines(tmp_path, stride=41, first=1)
+    check_lines(tmp_path, stride=83, first=1)

