@@ -126,8 +126,6 @@ def _set_arrival(rows: Array, scene: Scene) -> None:
     final, was = scene.insertion.final_depth, rows[:, at.DURATION].copy()
     if final is not None:
         rows[:, at.ARRIVAL] = (final - rows[:, at.DEPTH]) / rows[:, at.SPEED]
-        if np.any(rows[:, at.ARRIVAL] < 0.0):
-            raise SceneError("insertion.speed: leads away from insertion.final_depth in some runs")
         if scene.run.duration is None:
             rows[:, at.DURATION] = rows[:, at.ARRIVAL]
     if scene.numerics.output_step == "auto":

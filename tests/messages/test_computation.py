@@ -1,0 +1,209 @@
+"""Messages about computations that fail, which no other test meets; where only a broken machine would tell, it is broken here."""
+
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fem_needle import (
+    ComputationError,
+    FiniteElementNeedle,
+    NeedleError,
+    SceneError,
+    Trajectory,
+    load_scene,
+    mesh_file,
+    refined_run,
+    run_scene,
+    simulate,
+    simulate_many,
+    study_files,
+)
+from fem_needle.banded import SingularMatrixError
+from fem_needle.batch import many
+from fem_needle.benchmark import goal_measurements, goals
+from fem_needle.closed_loop import compiled_engine, repeating
+from fem_needle.closed_loop.simulation import Simulation
+from fem_needle.comparison.runs import shape_at
+from fem_needle.identification import sample_tips
+from fem_needle.march import started
+from fem_needle.motion import depth_law
+from fem_needle.pushed_march import started_push
+from fem_needle.pushing import Pusher
+from fem_needle.run_job import time_stepper
+from fem_needle.scene import Insertion, LateralLoad, TipLoad
+from fem_needle.statics import solve_static
+from fem_needle.steppers import DynamicStepper
+from reduced_model.identification import bending
+from tests.consistency.scenes import BUZZ, held, moving, scene_of
+
+GLIDING = scene_of("entry", moving(0.5, 0.04, 0.05), loads=(TipLoad(force=BUZZ),), duration=0.02)
+PUSHED = scene_of("hub", Insertion(kind="force", initial_depth=0.1, push_force=1.0), duration=0.01)
+
+
+def failing(error):
+    def fail(*given, **named):
+        raise error
+
+    return fail
+
+
+def test_a_run_of_many_without_a_finite_answer(monkeypatch):
+    original = many.prepared
+
+    def spoiled(*given):
+        compute = original(*given)
+
+        def computed(tips, first, last):
+            steps = compute(tips, first, last)
+            if first <= 2 < last:
+                tips[2, 3] = np.inf
+            return steps
+
+        return computed
+
+    monkeypatch.setattr(many, "prepared", spoiled)
+    with pytest.raises(ComputationError, match="run 2 has no finite answer: check its values, or use a smaller time_step"):
+        simulate_many(GLIDING, {"tissue.layers.0.foundation_modulus": [1e3, 2e3, 3e3]}, time_step=1e-3, vibrations=2, cores=1)
+
+
+@pytest.mark.parametrize("pushes", [False, True], ids=["moved", "pushed"])
+def test_there_is_no_sample_before_the_first_step(pushes):
+    scene = PUSHED if pushes else GLIDING
+    plant = FiniteElementNeedle(scene, elements=2)
+    stepper = time_stepper(plant, scene, "dynamic")
+    run = started_push(plant, stepper, 1e-4) if pushes else started(plant, stepper, depth_law(scene))
+    with pytest.raises(ComputationError, match="there is no sample before the first step"):
+        run.sample()
+
+
+def test_a_pushed_step_that_fails_says_where(monkeypatch):
+    plant = FiniteElementNeedle(PUSHED, elements=2)
+    run = started_push(plant, time_stepper(plant, PUSHED, "dynamic"), 1e-4)
+    monkeypatch.setattr(Pusher, "step", failing(FloatingPointError("the insertion speed does not converge")))
+    run.limits = replace(run.limits, final_depth=None, contact=0.05)
+    monkeypatch.setattr(type(run), "_levels", lambda self: SimpleNamespace(next=lambda depth, direction: None))
+    with pytest.raises(ComputationError, match=r"time 0 s, depth 0\.1 m failed: the insertion speed .*; use a smaller time_step"):
+        run.advance(1e-4)
+
+
+def test_a_step_to_what_is_no_number_says_where(monkeypatch):
+    plant = FiniteElementNeedle(GLIDING.with_value("numerics.loop", "numpy"), elements=2)
+    advance = DynamicStepper.advance
+
+    def spoiled(self, law, start, until, last):
+        step = advance(self, law, start, until, last)
+        if until > 0.005:
+            step.ends[1].solution.coordinates[:] = np.nan
+        return step
+
+    monkeypatch.setattr(DynamicStepper, "advance", spoiled)
+    with pytest.raises(ComputationError, match=r"time 0\.005 s, depth .* failed: the deflection is not finite"):
+        simulate(plant, time_step=1e-3, analysis="dynamic", output_step=5e-3)
+
+
+def test_a_compiled_loop_without_a_finite_answer_says_where(monkeypatch):
+    loads = [TipLoad(force=0.1), LateralLoad(position=-0.005, force=0.1)]
+    plant = FiniteElementNeedle(scene_of("hub", moving(0.5, 0.04, 0.05), loads=loads, duration=0.02), elements=2)
+    loop = Simulation(plant, time_step=1e-3, analysis="dynamic", output_step=0.01, energies=False)
+    monkeypatch.setattr(compiled_engine, "run_steps", lambda begin, stop, *given: begin)
+    with pytest.raises(ComputationError, match=r"time 0 s, depth 0\.04 m failed: the equations have no finite answer"):
+        loop.step({"lateral_force": 0.2}, 5e-3)
+
+
+def test_equilibria_without_a_solution(monkeypatch):
+    plant = FiniteElementNeedle(scene_of("entry", held(0.1)), elements=2)
+    monkeypatch.setattr("fem_needle.statics._solve_supported", failing(SingularMatrixError("zero pivot")))
+    with pytest.raises(ComputationError, match=r"no static solution at time 0 s, depth 0\.1 m: zero pivot; check stiffnesses"):
+        solve_static(plant, depth=0.1)
+
+
+def test_a_process_that_dies(monkeypatch):
+    class Dead:
+        def __init__(self, *given, **named):
+            pass
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *given):
+            return False
+
+        submit = failing(BrokenProcessPool())
+
+    monkeypatch.setattr(repeating, "ProcessPoolExecutor", Dead)
+    with pytest.raises(ComputationError, match="a process ended without an answer: it was killed, or memory was short"):
+        repeating.repeat(load_scene("steering"), 3, processes=2)
+
+
+def test_shapes_of_a_loaded_run_have_no_model(tmp_path):
+    run = run_scene(scene_of("entry", held(0.1), duration=0.01), elements=2, analysis="static", output_step=5e-3)
+    with pytest.raises(ComputationError, match="a run that was loaded from files has no model"):
+        shape_at(Trajectory.load(run.save(tmp_path / "run")), 0, np.array([0.2]))
+
+
+def test_rounding_that_outgrows_a_tolerance():
+    """Of a run that would need more and more steps: the chosen mesh's round-off, as a random walk, is beyond what is allowed."""
+    job = SimpleNamespace(chosen=SimpleNamespace(round_off=1e-9))
+    search = SimpleNamespace(job=job, allowed=1e-7, tolerance=2e-7)
+    with pytest.raises(ComputationError, match=r"tolerance = 2e-07 needs about 1e\+06 steps, .* ask for 2\.0e-06 or more"):
+        refined_run._refuse_rounding(search, 1e6)
+    refined_run._refuse_rounding(search, 1e3)
+
+
+def test_a_study_that_cannot_be_written(tmp_path, monkeypatch, command_line):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(study_files, "write_atomically", failing(OSError(28, "No space left on device")))
+    status, _, err = command_line("converge", "bench-s", "--out", "study")
+    assert status == 1
+    assert "study: cannot be written: [Errno 28] No space left on device" in err
+
+
+def test_a_mesh_of_bad_lines(monkeypatch):
+    points = np.zeros((3, 3))
+    with pytest.raises(SceneError, match="holds lines that do not have two nodes each"):
+        mesh_file._check_kinds(points, ["line"], np.zeros((2, 3), dtype=int))
+    monkeypatch.setattr(mesh_file, "MAXIMUM_ELEMENTS", 4)
+    with pytest.raises(SceneError, match=r"holds 5 lines \(allowed up to 4\)"):
+        mesh_file._check_kinds(points, ["line"], np.zeros((5, 2), dtype=int))
+
+
+def test_a_mesh_file_that_the_system_refuses():
+    with pytest.raises(SceneError, match=r"cannot be read: .*(too long|null)"):
+        mesh_file.read_mesh("m" * 5000 + ".vtu")
+
+
+def test_a_sample_without_equilibria(monkeypatch):
+    monkeypatch.setattr(sample_tips, "static_problem", lambda *given: None)
+    with pytest.raises(ComputationError, match="sample: its equilibria are not known"):
+        sample_tips.made_tips()
+
+
+def test_a_power_law_of_one_load():
+    with pytest.raises(ComputationError, match="a power law needs several loads and lengths"):
+        bending._power_law(SimpleNamespace(power_law=None))
+
+
+# Goals of the benchmark that cannot be measured.
+
+
+def test_no_random_scene_gave_an_answer(monkeypatch):
+    example = SimpleNamespace(scene=None, tips=np.ones(3))
+    monkeypatch.setattr(goal_measurements, "random_scene", lambda seed: example)
+    monkeypatch.setattr(goal_measurements, "whole_run", lambda scene: failing(NeedleError("too long")))
+    with pytest.raises(NeedleError, match="none of 2 scenes gave an answer in time"):
+        goal_measurements.hit_rate.__wrapped__(2)
+
+
+def test_goals_that_need_rows_that_are_not_there():
+    with pytest.raises(NeedleError, match="no fixed setting keeps a tolerance that was run"):
+        goal_measurements.cost_of_tolerance(())
+    with pytest.raises(NeedleError, match="scikit-fem with 40 elements was not run on M"):
+        goals._speed_up(())
+
+
+def test_a_command_that_fails_while_it_is_timed():
+    with pytest.raises(NeedleError, match=r"(?s)the process failed: .*No such option"):
+        goal_measurements.time_of_command("--no-such-option")
