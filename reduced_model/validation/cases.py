@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.exact import exact_static, tip_compliance
+from fem_needle.exact import exact_static
 from fem_needle.scene import Insertion, LateralLoad, Layer, Needle, Scene, Support, TipLoad, Tissue
 from reduced_model.needle import AssumedModeNeedle
 
@@ -83,7 +83,5 @@ def resting(needle: Needle, support: str, tissue: Tissue, loads: Sequence[Any] =
 
 
 def exact_tip(scene: Scene, depth: float) -> float:
-    """Return the exact tip deflection at rest [m]; a tip spring k_t takes w = w_0 / (1 + k_t C), C the tip's compliance."""
-    free = float(exact_static(scene, depth).tip_deflection)
-    spring = scene.tissue.tip_stiffness if scene.tissue.kind == "tip-spring" else None
-    return free / (1.0 + spring * tip_compliance(scene, depth)) if spring else free
+    """Return the exact tip deflection at rest [m]."""
+    return exact_static(scene, depth).tip_deflection
