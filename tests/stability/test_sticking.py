@@ -45,7 +45,7 @@ def true_motion(name):
     return np.array(rests), whole.tip(state, state[-2], time)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", ["elements, hub", *(pytest.param(name, marks=pytest.mark.slow) for name in list(MODELS)[1:])])
 def test_sticking_and_sliding_under_refinement(name):
     """Where it sticks, and where it is at the end, through three rests: as an integration by other means says."""
     plant, (rests, tip), errors = swinging(name), true_motion(name), []

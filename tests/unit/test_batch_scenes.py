@@ -80,7 +80,8 @@ def test_a_needle_let_go_in_viscous_tissue_comes_to_its_equilibrium(shape):
 
 def test_a_held_needle_under_a_constant_force_swings_about_its_equilibrium():
     """From straight, undamped: all vibrations, and the mean over many periods is the equilibrium."""
-    scene = scene_of("entry", held(0.1), GEL, initial=Initial(shape="straight"), duration=1.0).with_value("numerics.output_step", 1e-4)
+    scene = scene_of("entry", held(0.1), GEL, initial=Initial(shape="straight"), duration=1.0)
+    scene = scene.with_value("numerics.output_step", 1e-4)
     run = simulate_many(scene)
     rest = exact_static(scene, 0.1).tip_deflection
     assert abs(run.tip_deflection[0, 0]) < 1e-9 * rest
