@@ -70,7 +70,7 @@ class TissueBlock:
 def tissue_block(scene: Scene, deepest: float) -> TissueBlock | None:
     """Return the block of a scene whose tip gets down to ``deepest`` [m]; None where it has no tissue to show."""
     length = scene.needle.length
-    slabs = [(index, *_extent(layer, deepest, length)) for index, layer in enumerate(scene.tissue.layers)]
+    slabs = [(index, *layer_extent(layer, deepest, length)) for index, layer in enumerate(scene.tissue.layers)]
     slabs = [slab for slab in slabs if slab[2] > slab[1]]
     if not slabs:
         return None
@@ -91,7 +91,7 @@ def tissue_block(scene: Scene, deepest: float) -> TissueBlock | None:
     return TissueBlock(all_planes, np.exp(-np.hypot(y, z) / (KERNEL_LENGTH * length)), before, after)
 
 
-def _extent(layer: Layer, deepest: float, length: float) -> tuple[float, float]:
+def layer_extent(layer: Layer, deepest: float, length: float) -> tuple[float, float]:
     """Return where a layer is drawn from and to [m]."""
     if layer.end is not None:
         return layer.start, min(layer.end, max(FARTHEST * length, FARTHEST * deepest))

@@ -24,6 +24,8 @@ GROUPS = (
     "fem_needle.cli.run",
     "fem_needle.cli.steer",
     "fem_needle.cli.export",
+    "fem_needle.cli.plot",
+    "fem_needle.cli.view",
     "fem_needle.cli.converge",
     "fem_needle.cli.analyze",
     "fem_needle.cli.compare",

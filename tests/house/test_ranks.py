@@ -97,10 +97,12 @@ RANKS = {
     "matlab_file": 13,
     "vtkhdf_file": 13,
     "export": 15,
+    "view": 15,
     # studies of a scene
     "pictures": 0,
     "study_files": 4,
     "closed_loop": 18,
+    "figures": 19,
     "identification": 19,
     "cli": 20,
     "__main__": 21,

@@ -18,6 +18,7 @@ LATE_IMPORTS = {
     ("fem_needle.loops", "run_loop"),
     ("fem_needle.closed_loop.lean", "lean_engine"),
     ("fem_needle.batch.many", "prepared"),
+    ("fem_needle.view.picture", "_rendered"),  # VTK, in the process that draws
 }
 LATE_PACKAGES = ("fem_needle.cli", "reduced_model.commands")
 

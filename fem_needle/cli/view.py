@@ -1,0 +1,84 @@
+"""The command `view`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from fem_needle.cli.export import RunArgument
+from fem_needle.errors import SceneError
+
+if TYPE_CHECKING:
+    from fem_needle.view import Arrangement
+
+PICTURE = "view.png"
+
+
+def register(application: typer.Typer) -> None:
+    """Add the command."""
+    application.command("view")(view)
+
+
+def view(
+    run: RunArgument,
+    html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a page with a slider over time.")] = None,
+    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a picture, PNG, and open no window.")] = None,
+    time: Annotated[str | None, typer.Option(metavar="TIME", help="Sample to show; by default the last.")] = None,
+    magnification: Annotated[float | None, typer.Option(metavar="X", help="Of deflections; by default a round number.")] = None,
+    renderer: Annotated[str, typer.Option(metavar="NAME", help="Of the picture: auto, vtk or matplotlib.")] = "auto",
+    force: Annotated[bool, typer.Option("--force", help="Replace an earlier file.")] = False,
+) -> None:
+    """Show a run in three dimensions: a window, a picture, or a page for any browser.
+
+    Without a display and without options: RUN/view.png.
+
+    Example: fem-needle view runs/thesis --html thesis.html
+    """
+    from fem_needle.cli.settings import number
+    from fem_needle.run_folder import load_run
+    from fem_needle.view import arrangement
+
+    windowed = html is None and picture is None and _has_display()
+    if html is None and picture is None and not windowed:
+        picture = run / PICTURE
+        typer.echo("note: no display, so a picture in place of a window", err=True)
+    for path in (html, picture):
+        if path is not None and path.exists() and not force:
+            raise SceneError(f"{path}: exists already (use --force to replace it)")
+    arranged = arrangement(load_run(run), magnification)
+    row = arranged.row(None if time is None else number("--time", time, "s"))
+    if windowed:
+        from fem_needle.view.by_vtk import show
+
+        show(arranged, row)
+    if html is not None:
+        _write_page(arranged, row, html)
+    if picture is not None:
+        _write_picture(arranged, row, picture, renderer)
+
+
+def _has_display() -> bool:
+    return sys.platform in {"win32", "darwin"} or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _write_page(arranged: Arrangement, row: int, path: Path) -> None:
+    from fem_needle.view.html import write_html
+
+    count = write_html(arranged, path, row)
+    typer.echo(f"wrote {path}: {count} of {len(arranged.run.time)} samples; {arranged.note}")
+
+
+def _write_picture(arranged: Arrangement, row: int, path: Path, renderer: str) -> None:
+    from fem_needle.view import Renderer, write_picture
+
+    names = [kind.value for kind in Renderer]
+    if renderer not in names:
+        raise SceneError(f"--renderer: is not a choice (got {renderer!r}; allowed {', '.join(names)})")
+    drawer = write_picture(arranged, row, path, Renderer(renderer))
+    typer.echo(f"wrote {path}: {arranged.note}")
+    if drawer is Renderer.MATPLOTLIB and renderer == Renderer.AUTO.value:
+        typer.echo("note: VTK found no GL here, so matplotlib drew it", err=True)

@@ -1,0 +1,220 @@
+"""A run in three dimensions: where things stand, what is said, which way arrows point, who draws."""
+
+from __future__ import annotations
+
+import json
+import re
+from concurrent.futures.process import BrokenProcessPool
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fem_needle import SceneError, load_scene, run_scene
+from fem_needle.errors import NeedleError
+from fem_needle.run_folder import save_run
+from fem_needle.scene import Guide, LateralLoad
+from fem_needle.view import Renderer, arrangement, picture, write_picture
+from fem_needle.view.drawing import drawing
+from fem_needle.view.html import html_page, shown_rows
+from fem_needle.view.solids import arrow, box, plate, tube
+from tests.consistency.scenes import LAYERS, moving, scene_of
+
+LATERAL = (LateralLoad(position=-0.02, force=0.4),)
+SCENE = scene_of(
+    "hub", moving(0.1, 0.02, 0.08), layers=LAYERS, loads=LATERAL, support={"guides": (Guide(position=-0.05),)},
+    numerics={"analysis": "static", "output_step": 0.1}, duration=0.6, title="needle <b>one</b>",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def arranged():
+    return arrangement(run_scene(SCENE))
+
+
+def volume(surface):
+    """Return the volume inside a closed surface whose triangles turn outward."""
+    a, b, c = (surface.points[surface.triangles[:, corner]] for corner in range(3))
+    return float(np.sum(np.einsum("ij,ij->i", a, np.cross(b, c)))) / 6.0
+
+
+def test_solids_are_closed_and_turn_outward():
+    line = np.column_stack((np.linspace(0.0, 10.0, 5), np.zeros(5), np.zeros(5)))
+    polygon = 12 * 0.5 * np.sin(2 * np.pi / 12)  # area of the tube's cross-section of radius 1
+    assert volume(tube(line, 1.0)) == pytest.approx(10.0 * polygon)
+    assert volume(box(1.0, 3.0, 0.5)) == pytest.approx(2.0)
+    solid = arrow(np.zeros(3), np.array([0.0, -4.0, 0.0]), 0.1)
+    assert volume(solid) > 0.0
+    assert solid.points[:, 1].min() == pytest.approx(-4.0) and solid.points[:, 1].max() == pytest.approx(0.0)
+    assert np.allclose(plate(5.0, 1.0, 2.0).points[:, 0], 5.0)
+
+
+def test_the_needle_stands_where_the_run_says(arranged):
+    pose, run = arranged.pose(3), arranged.run
+    assert pose.tip == pytest.approx([1e3 * run.depth[3], 1e3 * arranged.magnification * run.tip_deflection[3], 0.0])
+    assert pose.needle.points[:, 0].min() == pytest.approx(1e3 * (run.depth[3] - 0.2))
+    assert f"depth {1e3 * run.depth[3]:.4g} mm" in pose.caption
+
+
+def test_arrows_point_where_forces_push(arranged):
+    """The load pushes up, at -20 mm, its tip on the needle; its supports push down in sum, less what the tissue takes."""
+    pose = arranged.pose(0)
+    points = pose.loads.points
+    assert np.allclose(np.unique(np.round(points[np.argmax(points[:, 1]), 0])), -20.0)
+    line = arranged._line(0)
+    assert points[:, 1].max() == pytest.approx(np.interp(-20.0, line[:, 0], line[:, 1]))
+    assert points[:, 1].max() - points[:, 1].min() == pytest.approx(arranged.newton * 0.4)
+    guide = arranged.run.guide_force[0, 0]
+    near = pose.reactions.points[np.abs(pose.reactions.points[:, 0] + 50.0) < 5.0]
+    assert np.sign(guide) == -1.0 and near[:, 1].max() - near[:, 1].min() == pytest.approx(-arranged.newton * guide, rel=0.01)
+
+
+def test_what_is_not_to_scale_is_said(arranged):
+    assert arranged.note.startswith(f"deflections {arranged.magnification:g} times as large; arrows: 25 mm = ")
+    assert "times as large" in drawing(arranged, 0).note
+    shown = 1e3 * arranged.magnification * np.max(np.abs(arranged.run.station_deflection))
+    assert 0.4 * 25.0 <= shown <= 25.0  # an eighth of 200 mm, by steps of 1, 2, 5
+
+
+@pytest.mark.parametrize(("magnification", "said"), [(3.0, 3), (None, 1)])
+def test_magnification_may_be_given_and_a_needle_at_rest_has_none(magnification, said):
+    run = run_scene(SCENE.with_values({"loads": []}))
+    assert arrangement(run, magnification).note.startswith(f"deflections {said} times as large")
+    assert "arrows" not in arrangement(run).note
+
+
+def test_layers_and_ruler(arranged):
+    assert [(slab.start, slab.end) for slab in arranged.slabs] == [(0.0, 50.0), (50.0, 80.0), (100.0, 150.0)]
+    assert arranged.slabs[1].label == "layer 2: 20 kN/m\u00b2"
+    assert arranged.ruler.tolist() == pytest.approx(np.arange(-150.0, 151.0, 50.0))
+
+
+@pytest.mark.parametrize("magnification", [0.0, -2.0, np.inf, np.nan])
+def test_impossible_magnifications(arranged, magnification):
+    with pytest.raises(SceneError, match="--magnification: is no positive number"):
+        arrangement(arranged.run, magnification)
+
+
+def test_times_outside_the_run(arranged):
+    assert arranged.row(None) == len(arranged.run.time) - 1
+    assert arranged.row(0.31) == 3
+    with pytest.raises(SceneError, match=r"--time: not in the run \(got 2; allowed 0 to 0.6 s\)"):
+        arranged.row(2.0)
+
+
+def test_a_page_has_frames_for_the_samples_and_needs_no_network(arranged):
+    page = html_page(arranged, 2)
+    assert "needle &lt;b&gt;one&lt;/b&gt;" in page and "<b>one</b>" not in page
+    assert page.count('"name":"6"') == 1 and '"active":2' in page
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=", page)
+    assert f"Deflections {arranged.magnification:g} times as large" in page
+
+
+def test_a_page_of_a_long_run_has_samples_spread_over_it():
+    rows = shown_rows(1001, 333)
+    assert (len(rows), rows[0], rows[-1]) == (61, 0, 1000) and 333 in rows
+    assert shown_rows(3) == [0, 1, 2]
+
+
+def colors(path):
+    image = np.asarray(Image.open(path).convert("RGB")).reshape(-1, 3)
+    return {tuple(color) for color in np.unique(image, axis=0).tolist()}
+
+
+def test_matplotlib_draws_where_it_is_asked(arranged, tmp_path):
+    assert write_picture(arranged, 0, tmp_path / "a.png", Renderer.MATPLOTLIB) is Renderer.MATPLOTLIB
+    assert len(colors(tmp_path / "a.png")) > 100
+
+
+def test_a_crash_of_vtk_falls_back_to_matplotlib_and_is_announced(arranged, monkeypatch, tmp_path, command_line):
+    class Crashing:
+        def __init__(self, *_):
+            pass
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            return None
+
+        def submit(self, *_):
+            raise BrokenProcessPool("the process ended")
+
+    monkeypatch.setattr(picture, "ProcessPoolExecutor", Crashing)
+    assert write_picture(arranged, 0, tmp_path / "a.png") is Renderer.MATPLOTLIB
+    with pytest.raises(NeedleError, match="--renderer: VTK cannot draw here: it finds no GL"):
+        write_picture(arranged, 0, tmp_path / "b.png", Renderer.VTK)
+    save_run(arranged.run, tmp_path / "run", vtk=False)
+    status, out, err = command_line("view", str(tmp_path / "run"), "--picture", str(tmp_path / "c.png"))
+    assert status == 0 and "times as large" in out
+    assert "note: VTK found no GL here, so matplotlib drew it" in err
+
+
+@pytest.mark.slow
+def test_vtk_draws_the_needle(arranged, tmp_path):
+    """Where there is GL: the needle's dark pixels move when the magnification grows."""
+    drawer = write_picture(arranged, 6, tmp_path / "a.png")
+    if drawer is not Renderer.VTK:
+        pytest.skip("no GL here")
+    assert len(colors(tmp_path / "a.png")) > 20
+    write_picture(arrangement(arranged.run, 5 * arranged.magnification), 6, tmp_path / "b.png")
+    assert (tmp_path / "a.png").read_bytes() != (tmp_path / "b.png").read_bytes()
+
+
+@pytest.fixture
+def view(command_line, arranged, monkeypatch, tmp_path):
+    save_run(arranged.run, tmp_path / "run", vtk=False)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    return lambda *arguments: command_line("view", "run", *arguments)
+
+
+def test_without_a_display_a_picture_is_left_in_the_run(view, tmp_path):
+    status, out, err = view("--renderer", "matplotlib")
+    assert status == 0 and "wrote run/view.png" in out
+    assert "note: no display, so a picture in place of a window" in err
+    assert view("--renderer", "matplotlib")[0] == 2
+    assert view("--renderer", "matplotlib", "--force")[0] == 0
+
+
+def test_a_page_by_the_command(view, tmp_path):
+    status, out, _ = view("--html", "a.html", "--time", "0.2 s", "--magnification", "7")
+    assert status == 0 and "wrote a.html: 7 of 7 samples; deflections 7 times as large" in out
+    assert '"active":2' in (tmp_path / "a.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--renderer", "paint", "--picture", "a.png"), "is not a choice (got 'paint'; allowed auto, vtk, matplotlib)"),
+        (("--time", "9", "--picture", "a.png"), "--time: not in the run (got 9; allowed 0 to 0.6 s)"),
+        (("--magnification", "-1", "--html", "a.html"), "--magnification: is no positive number (got -1)"),
+    ],
+)
+def test_mistakes(view, arguments, message):
+    status, _, err = view(*arguments)
+    assert status == 2 and message in err
+
+
+def test_a_display_gets_a_window(view, monkeypatch):
+    shown = []
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr("fem_needle.view.by_vtk.show", lambda arranged, row: shown.append(row))
+    assert view("--time", "0.3")[0] == 0
+    assert shown == [3]
+
+
+def test_a_loop_shows_what_was_commanded():
+    run = run_scene(load_scene("thesis").with_values({"numerics.output_step": 8.0}))
+    run.signals["command_tip_direction"] = np.array([1.0, -1.0, np.nan])
+    arranged = arrangement(run)
+    poses = [arranged.pose(row) for row in range(3)]
+    ways = [1 if pose.loads.points[:, 1].max() <= pose.tip[1] + 1e-9 else -1 for pose in poses]  # the arrow ends at the tip
+    assert ways == [1, -1, 1]
+
+
+def test_frames_say_their_own_time(arranged):
+    captions = re.findall(r'"title":\{"text":"([^"]+)"', html_page(arranged))
+    texts = {json.loads(f'"{caption}"') for caption in captions}
+    assert {arranged.pose(row).caption for row in range(7)} <= texts
