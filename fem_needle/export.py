@@ -57,7 +57,7 @@ def export_run(run: Trajectory, kind: str, path: Path, *, force: bool = False) -
         return _export_frames(run, path, force=force)
     targets = _targets(kind, path)
     for target in targets:
-        _check(target, force=force)
+        check_target(target, force=force)
     for target, content in targets.items():
         with _writing(target):
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -71,8 +71,14 @@ def _targets(kind: str, path: Path) -> dict[Path, Callable[[Trajectory], bytes]]
     return {path / name: content for name, content in _FILES[kind].items()}
 
 
-def _check(target: Path, *, force: bool) -> None:
-    """Refuse to overwrite a folder or, without ``force``, a file, and places that cannot be."""
+def check_target(target: Path, *, force: bool) -> None:
+    """Refuse to overwrite a folder or, without ``force``, a file, and places that cannot be.
+
+    Raises
+    ------
+    SceneError
+        That says why.
+    """
     try:
         exists, is_folder = target.exists(), target.is_dir()
         holder = next(folder for folder in target.absolute().parents if folder.exists())
@@ -89,7 +95,7 @@ def _check(target: Path, *, force: bool) -> None:
 def _export_frames(run: Trajectory, folder: Path, *, force: bool) -> tuple[Path, ...]:
     """Write `deflection.pvd` with its frames, as the run itself does."""
     collection = folder / COLLECTION
-    _check(collection, force=force)
+    check_target(collection, force=force)
     _check_frames(folder, force=force)
     with _writing(collection), _held(folder):
         collection.unlink(missing_ok=True)

@@ -14,6 +14,7 @@ DOTS_PER_INCH = 120
 INK = "#303030"
 # Okabe and Ito, in the order of use: blue, vermilion, bluish green, reddish purple, orange, sky blue.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+DASHES: Any = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)), (0, (3, 3)), (0, (8, 2)))
 MARKERS = ("o", "s", "^", "D", "v", "P")
 STYLE: Any = {
     "font.size": 10.0,
@@ -30,6 +31,10 @@ STYLE: Any = {
     "xtick.color": INK,
     "ytick.color": INK,
 }
+FORMATS = ("png", "svg", "pdf")
+# Letters stay letters, which can be searched and edited; names inside a file do not change from one writing to the next.
+_VECTOR_STYLE: Any = {"svg.fonttype": "none", "svg.hashsalt": "fem-needle", "pdf.fonttype": 42}
+_METADATA: Any = {"svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None, "Creator": None, "Producer": None}}
 
 
 def new_figure(width: float = WIDTH, height: float = HEIGHT) -> Figure:
@@ -47,4 +52,22 @@ def png_bytes(figure: Figure) -> bytes:
     content = BytesIO()
     with shared_style():
         figure.savefig(content, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None}, pil_kwargs={"optimize": True})
+    return content.getvalue()
+
+
+def picture_bytes(figure: Figure, kind: str = "png") -> bytes:
+    """Return a figure as one of `FORMATS`, the same bytes for the same figure.
+
+    Raises
+    ------
+    ValueError
+        If the format is none of them.
+    """
+    if kind == "png":
+        return png_bytes(figure)
+    if kind not in FORMATS:
+        raise ValueError(f"format: is not a choice (got {kind!r}; allowed {', '.join(FORMATS)})")
+    content = BytesIO()
+    with mpl.rc_context(STYLE | _VECTOR_STYLE):
+        figure.savefig(content, format=kind, metadata=_METADATA[kind])
     return content.getvalue()

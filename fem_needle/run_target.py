@@ -14,7 +14,11 @@ from fem_needle.manifest import is_run_folder
 
 # What a run folder holds, exports of an older run included; `force` removes this and nothing else.
 EXPORTS = ("series.csv", "deflection.csv", "series.mat", "deflection.vtkhdf")
-FILES = ("summary.json", "series.nc", "steer.png", "deflection.pvd", *EXPORTS, "scene.toml", "manifest.json")
+# Pictures of a run by kind, each with one of the endings.
+PICTURES = {"shapes": "shapes", "tip-path": "tip_path", "courses": "courses", "energies": "energies", "waterfall": "waterfall"}
+ANIMATION = "animation.gif"
+_DRAWN = (*(f"{name}.{ending}" for name in PICTURES.values() for ending in ("png", "svg", "pdf")), ANIMATION)
+FILES = ("summary.json", "series.nc", "steer.png", "deflection.pvd", *EXPORTS, *_DRAWN, "scene.toml", "manifest.json")
 STUDIES = ("converge.json", "compare.json", "analyze.json", "benchmark.json", "steer.json", "identify.json")
 FRAMES = (("needle", "*.vtp"), ("tissue", "*.vtu"))
 

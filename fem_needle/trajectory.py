@@ -11,6 +11,7 @@ import numpy as np
 import scipy  # its parts are loaded where they are used
 from numpy.typing import NDArray
 
+from fem_needle.display import Card, Shown, in_millimeters
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample
 from fem_needle.scene import Scene, as_function
@@ -49,6 +50,7 @@ VARIABLES: dict[str, tuple[str, str]] = {
 }
 
 SAME_STATION = 1e-6  # of the length
+_RATIOS = ("error_estimate", "relative_energy_residual")
 
 _FROM_SAMPLES = tuple(
     name
@@ -57,8 +59,8 @@ _FROM_SAMPLES = tuple(
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Shown):
     """A run, sample by sample.
 
     Every variable of `VARIABLES` is an attribute, shape (nt,), e.g. ``run.tip_deflection``.
@@ -109,6 +111,24 @@ class Trajectory:
             return self.signals[name]
         known = ", ".join([*VARIABLES, *self.__dict__.get("signals", ())])
         raise AttributeError(f"a trajectory has no {name!r}; its variables are {known}")
+
+    def _card(self) -> Card:
+        summary, model = self.summary, str(self.summary.get("model", self.scene.model.kind))
+        ending = summary.get("stop_reason", "end")
+        facts = [
+            ("depth", f"{in_millimeters(float(self.depth[-1]))} at {self.time[-1]:.4g} s ({ending})"),
+            ("tip", f"{in_millimeters(float(self.tip_deflection[-1]))}"),
+            ("push", f"{self.push_force[-1]:.4g} N"),
+            ("analysis", f"{summary.get('analysis', 'unknown')}"),
+            ("model", model),
+            ("samples", str(len(self.time))),
+            ("largest tip", in_millimeters(float(np.max(np.abs(self.tip_deflection))))),
+            *((name.replace("_", " "), f"{summary[name]:.1e}") for name in _RATIOS if summary.get(name) is not None),
+            *(("signal", name) for name in self.signals),
+        ]
+        if "target_error" in summary:
+            facts.insert(1, ("target error", in_millimeters(summary["target_error"])))
+        return Card("Trajectory", self.scene.title, tuple(facts))
 
     def deflection(self, arc_length: Array | None = None, derivative: int = 0) -> Array:
         """Return the deflection [m], or a derivative by arc length, at stations, shape (nt, n).

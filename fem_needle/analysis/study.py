@@ -20,6 +20,7 @@ from fem_needle.analysis.controllability import (
     output_controllability,
 )
 from fem_needle.analysis.depth_gains import DepthGains, depth_gains
+from fem_needle.display import Card, Shown, columns_in_millimeters, in_millimeters
 from fem_needle.errors import SceneError
 from fem_needle.linear.linearization import Axial, linearize, reach
 from fem_needle.linear.modal_form import AXIAL, modal
@@ -102,8 +103,8 @@ class DepthAnalysis:
         return found[0]
 
 
-@dataclass(frozen=True, eq=False)
-class Analysis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Analysis(Shown):
     """Analyses at chosen depths, and the gains over all depths.
 
     Attributes
@@ -128,6 +129,26 @@ class Analysis:
     def depths(self) -> Array:
         """Chosen depths [m]."""
         return np.array([one.model.operating_point.depth for one in self.points])
+
+    def _card(self) -> Card:
+        changes = [f"{one.input} at {in_millimeters(one.depth)}" for one in self.curve.sign_changes]
+        facts = (
+            ("model", " ".join(str(value) for value in self.plant.describe().values())),
+            ("depths", ", ".join(in_millimeters(float(depth)) for depth in self.depths)),
+            ("axial", self.axial),
+            ("gain changes sign", "; ".join(changes) or "nowhere"),
+            ("warnings", "; ".join(self.warnings) or "none"),
+        )
+        rows = [(one.model.natural_frequencies, one.verdicts) for one in self.points]
+        columns: dict[str, list[Any]] = {
+            "depth [m]": self.depths.tolist(),
+            "lowest natural frequency [rad/s]": [float(np.min(found)) if len(found) else None for found, _ in rows],
+        }
+        for name in self.points[0].gains:
+            columns[f"static gain of {name} [m per unit]"] = [one.gains[name] for one in self.points]
+        questions = dict.fromkeys(verdict.question for verdict in self.points[0].verdicts)
+        columns |= {question: [one.verdict(question).holds for one in self.points] for question in questions}
+        return Card("Analysis", self.plant.scene.title, facts, columns_in_millimeters(columns))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI."""

@@ -16,6 +16,7 @@ from fem_needle.batch import columns as at
 from fem_needle.batch.rows import can_vary, depths_of, row_of, rows_of, times_of
 from fem_needle.batch.spectrum import Spectrum, is_uniform, spectrum_of
 from fem_needle.collocation import collocation
+from fem_needle.display import Card, Shown, in_millimeters
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.models import build_plant
 from fem_needle.scene import Scene
@@ -32,8 +33,8 @@ FIRST = (12, 4)  # elements and moving vibrations to begin with
 LAST = (96, 32)
 
 
-@dataclass(frozen=True, eq=False)
-class ManyRuns:
+@dataclass(frozen=True, eq=False, repr=False)
+class ManyRuns(Shown):
     """What many runs have computed; SI.
 
     Attributes
@@ -51,6 +52,18 @@ class ManyRuns:
     tip_deflection: Array
     error_estimate: float
     steps: int
+
+    def _card(self) -> Card:
+        tips = self.final_tip_deflection
+        spread = f"{in_millimeters(float(np.min(tips)))} to {in_millimeters(float(np.max(tips)))}" if len(self) else "none"
+        facts = (
+            ("runs", str(len(self))),
+            ("outputs", str(self.time.shape[1])),
+            ("tips at the end", spread),
+            ("steps", str(self.steps)),
+            ("error estimate", f"{self.error_estimate:.1e}"),
+        )
+        return Card("ManyRuns", "", facts)
 
     def __len__(self) -> int:
         """Return the number of runs."""

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from fem_needle.benchmark.methods import Setting
+from fem_needle.display import Card, Shown
 
 
 @dataclass(frozen=True)
@@ -124,8 +125,8 @@ class CaseInformation:
     reference: str
 
 
-@dataclass(frozen=True, eq=False)
-class Benchmark:
+@dataclass(frozen=True, eq=False, repr=False)
+class Benchmark(Shown):
     """Run time against error.
 
     Attributes
@@ -153,6 +154,25 @@ class Benchmark:
     machine: dict[str, Any] | None = None
     commit: str | None = None
     date: str = ""
+
+    def _card(self) -> Card:
+        met = sum(goal.met is True for goal in self.goals)
+        facts = (
+            ("cases", ", ".join(case.name for case in self.cases)),
+            ("rows", str(len(self.rows))),
+            *((("goals met", f"{met} of {len(self.goals)}"),) if self.goals else ()),
+            ("date", self.date or "unknown"),
+            ("commit", self.commit or "unknown"),
+        )
+        columns: dict[str, list[Any]] = {
+            "case": [row.case for row in self.rows],
+            "method": [row.method for row in self.rows],
+            "setting": [row.setting.label for row in self.rows],
+            "error": [row.error for row in self.rows],
+            "median [s]": [row.median for row in self.rows],
+            "note": [row.note for row in self.rows],
+        }
+        return Card("Benchmark", "", facts, columns)
 
     def of_case(self, name: str) -> tuple[Row, ...]:
         """Return the rows of a case."""

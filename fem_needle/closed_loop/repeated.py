@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.closed_loop.repetitions import Draw
+from fem_needle.display import Card, Shown, columns_in_millimeters, in_millimeters
 from fem_needle.scene import Scene
 from fem_needle.scene.signals import INPUT_UNITS, effort_unit
 
@@ -74,8 +75,8 @@ class Repetition:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class RepeatedLoop:
+@dataclass(frozen=True, eq=False, repr=False)
+class RepeatedLoop(Shown):
     """Many runs of a loop.
 
     Attributes
@@ -91,6 +92,18 @@ class RepeatedLoop:
     scene: Scene
     asked: int
     repetitions: tuple[Repetition, ...]
+
+    def _card(self) -> Card:
+        facts = (
+            ("repetitions", f"{len(self.repetitions)} of {self.asked}"),
+            ("arrived", str(self.target_errors.size)),
+            ("mean error", in_millimeters(self.mean)),
+            ("standard deviation", in_millimeters(self.standard_deviation)),
+            ("largest", in_millimeters(self.largest_error)),
+            ("failed", str(self.failed)),
+            ("missed", str(self.missed)),
+        )
+        return Card("RepeatedLoop", self.scene.title, facts, columns_in_millimeters(self.columns()))
 
     @property
     def target_errors(self) -> Array:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fem_needle.comparison.at_rest import FREQUENCIES, RestStates, StaticErrors, StaticLoad
 from fem_needle.comparison.ranges import Interval
 from fem_needle.comparison.runs import ENERGIES, RunErrors, TimedRun, shape_at
+from fem_needle.display import Card, Shown, in_millimeters, text
 from fem_needle.scene import Scene
 
 Array = NDArray[np.float64]
@@ -106,8 +107,8 @@ class Shape:
     deflections: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Shown):
     """Models against a reference on the same scene.
 
     Attributes
@@ -141,6 +142,23 @@ class Comparison:
     load: StaticLoad | None
     depths: tuple[float, ...]
     within: float
+
+    def _card(self) -> Card:
+        facts = (
+            ("reference", self.reference.label),
+            ("models", ", ".join(model.answer.label for model in self.models)),
+            ("largest tip error", text(self.largest_tip_error, 3)),
+            ("analysis", self.analysis),
+            ("depths", ", ".join(in_millimeters(depth) for depth in self.depths)),
+            ("kinematics", self.kinematics),
+        )
+        columns: dict[str, list[Any]] = {
+            "model": [model.answer.label for model in self.models],
+            "unknowns": [model.answer.unknowns for model in self.models],
+            "largest tip error": [float(f"{model.largest_tip_error:.3g}") for model in self.models],
+            "warnings": ["; ".join(model.answer.warnings) for model in self.models],
+        }
+        return Card("Comparison", self.scene.title, facts, columns)
 
     @property
     def answers(self) -> tuple[ModelAnswer, ...]:

@@ -19,6 +19,7 @@ from fem_needle.convergence.refinement import (
 )
 from fem_needle.convergence.rows import ConvergenceRow, RowMaker, best_reference, gathered
 from fem_needle.convergence.theoretical_order import theoretical_order
+from fem_needle.display import Card, Shown, columns_in_millimeters, in_millimeters, text
 from fem_needle.errors import SceneError
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
@@ -32,8 +33,8 @@ _COLUMN_UNITS = {"tip_deflection": "m", "richardson_tip": "m", "solve_time": "s"
 Over = Literal["elements", "time-step", "modes"]
 
 
-@dataclass(frozen=True, eq=False)
-class ConvergenceStudy:
+@dataclass(frozen=True, eq=False, repr=False)
+class ConvergenceStudy(Shown):
     """What a convergence study found.
 
     Attributes
@@ -80,6 +81,20 @@ class ConvergenceStudy:
     def error(self) -> float | None:
         """Relative error of the finest row [1]."""
         return self.rows[-1].error
+
+    def _card(self) -> Card:
+        order = "none" if self.observed_order is None else f"{self.observed_order:.3f}"
+        facts = (
+            ("over", self.over),
+            ("rows", str(len(self.rows))),
+            ("order", order if self.theoretical_order is None else f"{order} (theory {self.theoretical_order:g})"),
+            ("error of the finest", text(self.error, 3) or "unknown"),
+            ("reference", self.reference),
+            ("its tip", in_millimeters(self.reference_tip, 8)),
+            ("analysis", self.analysis),
+            ("theory", self.theory),
+        )
+        return Card("ConvergenceStudy", self.scene.title, facts, columns_in_millimeters(self.columns()))
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything but the scene as plain data, SI: `converge.json`."""

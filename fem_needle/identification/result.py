@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.display import Card, Shown, text
 from fem_needle.identification.least_squares import LinearFit
 from fem_needle.identification.predictions import MeasuredRow
 from fem_needle.scene import Scene
@@ -81,8 +82,8 @@ class Prediction:
     inside: float
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Shown):
     """Result of `identify`.
 
     Attributes
@@ -120,6 +121,22 @@ class Identification:
     prediction: Prediction | None
     evaluations: int
     rows: tuple[MeasuredRow, ...]
+
+    def _card(self) -> Card:
+        facts = (
+            *((one.path, f"{one.value:.5g} ({one.interval[0]:.5g} to {one.interval[1]:.5g})") for one in self.parameters),
+            ("rows", str(len(self.measured))),
+            ("condition", text(self.condition, 3)),
+            ("residuals like noise, p", text(self.whiteness.p_value, 2)),
+        )
+        columns: dict[str, list[Any]] = {
+            "parameter": [one.path for one in self.parameters],
+            "fitted [SI]": [one.value for one in self.parameters],
+            "95 % from [SI]": [one.interval[0] for one in self.parameters],
+            "95 % to [SI]": [one.interval[1] for one in self.parameters],
+            "start [SI]": [one.start for one in self.parameters],
+        }
+        return Card("Identification", self.scene.title, facts, columns)
 
     @property
     def correlation(self) -> Array:

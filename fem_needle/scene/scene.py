@@ -8,7 +8,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, StrictStr, ValidationError, model_validator
 
+from fem_needle.display import Card, Shown
 from fem_needle.errors import SceneError
+from fem_needle.scene.card import scene_card
 from fem_needle.scene.cross_checks import cross_mistakes
 from fem_needle.scene.insertion import Insertion
 from fem_needle.scene.loads import Load
@@ -23,7 +25,7 @@ from fem_needle.scene.support import Support
 from fem_needle.scene.tissue import Tissue
 
 
-class Scene(Part):
+class Scene(Shown, Part):
     """A needle, its support, the tissue, the insertion, the loads; SI, frozen.
 
     Built with keywords, or from a file with `fem_needle.load_scene`.
@@ -56,6 +58,9 @@ class Scene(Part):
     def _check(self) -> Self:
         raise_mistakes("Scene", cross_mistakes(self))
         return self
+
+    def _card(self) -> Card:
+        return scene_card(self)
 
     @property
     def duration(self) -> float:

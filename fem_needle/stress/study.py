@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from os import cpu_count
 
+from fem_needle.display import Card, Shown
 from fem_needle.stress.cases import Case, cases
 from fem_needle.stress.trial import Figure, Trial
 
@@ -58,14 +59,27 @@ class StressRow:
         return self.case, self.extent, *counts, _shown(self.worst)
 
 
-@dataclass(frozen=True)
-class StressTable:
+@dataclass(frozen=True, repr=False)
+class StressTable(Shown):
     """The rows, and how to get them again."""
 
     rows: tuple[StressRow, ...]
     random_scenes: int
     first_seed: int
     long: bool
+
+    def _card(self) -> Card:
+        runs = sum(len(row.trials) for row in self.rows)
+        facts = (
+            ("cases", str(len(self.rows))),
+            ("runs", str(runs)),
+            ("failures", str(self.failures)),
+            ("random scenes", str(self.random_scenes)),
+            ("first seed", str(self.first_seed)),
+        )
+        names = ("case", "range", "runs", "announced", "failures", "worst figure")
+        cells = [row.cells() for row in self.rows]
+        return Card("StressTable", "", facts, {name: [row[place] for row in cells] for place, name in enumerate(names)})
 
     @property
     def failures(self) -> int:

@@ -1,0 +1,100 @@
+"""Pictures of a run as files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from fem_needle.atomic_file import write_atomically
+from fem_needle.errors import ComputationError, SceneError
+from fem_needle.export import check_target
+from fem_needle.figures.animation import animated_gif
+from fem_needle.figures.course_figure import courses
+from fem_needle.figures.energy_figure import energies
+from fem_needle.figures.shape_figure import shapes
+from fem_needle.figures.tip_figure import tip_path
+from fem_needle.figures.waterfall_figure import waterfall
+from fem_needle.pictures import FORMATS, picture_bytes
+from fem_needle.run_target import ANIMATION, PICTURES
+from fem_needle.trajectory import Trajectory
+
+_DRAWN: dict[str, Callable[[Trajectory], Figure]] = {
+    "shapes": shapes,
+    "tip-path": tip_path,
+    "courses": courses,
+    "energies": energies,
+    "waterfall": waterfall,
+}
+KINDS = tuple(_DRAWN)
+
+
+def write_pictures(
+    run: Trajectory,
+    folder: Path,
+    kinds: Sequence[str] = KINDS,
+    formats: Sequence[str] = ("png",),
+    *,
+    depths: Sequence[float] | None = None,
+    animate: bool = False,
+    force: bool = False,
+) -> tuple[Path, ...]:
+    """Write pictures of a run into a folder and return the files, `shapes.png` and so on.
+
+    Parameters
+    ----------
+    run
+        Computed or loaded.
+    folder
+        Created where it is missing.
+    kinds
+        Of `KINDS`.
+    formats
+        Of `FORMATS`.
+    depths
+        Of the shapes [m].
+    animate
+        Also `animation.gif`.
+    force
+        Replace earlier pictures.
+
+    Raises
+    ------
+    SceneError
+        If a kind or a format is unknown, a depth is none of the run, or something is there that must not be overwritten.
+    ComputationError
+        If a file cannot be written.
+    """
+    contents = _contents(run, kinds, formats, depths)
+    if animate:
+        contents[ANIMATION] = lambda: animated_gif(run)
+    for name in contents:
+        check_target(folder / name, force=force)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in contents.items():
+            write_atomically(folder / name, content())
+    except OSError as error:
+        raise ComputationError(f"{folder}: pictures cannot be written: {error.strerror or error}") from error
+    return tuple(folder / name for name in contents)
+
+
+def _contents(
+    run: Trajectory, kinds: Sequence[str], formats: Sequence[str], depths: Sequence[float] | None
+) -> dict[str, Callable[[], bytes]]:
+    """Return what draws each file, by its name."""
+    _check_choices("kind", kinds, KINDS)
+    _check_choices("format", formats, FORMATS)
+    drawn = {kind: shapes(run, depths) if kind == "shapes" else _DRAWN[kind](run) for kind in dict.fromkeys(kinds)}
+    return {
+        f"{PICTURES[kind]}.{ending}": (lambda figure=figure, ending=ending: picture_bytes(figure, ending))  # type: ignore[misc]
+        for kind, figure in drawn.items()
+        for ending in dict.fromkeys(formats)
+    }
+
+
+def _check_choices(name: str, given: Sequence[str], allowed: Sequence[str]) -> None:
+    for choice in given:
+        if choice not in allowed:
+            raise SceneError(f"{name}: is not a choice (got {choice!r}; allowed {', '.join(allowed)})")
