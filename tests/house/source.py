@@ -1,12 +1,13 @@
 """The source as the house tests see it."""
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("fem_needle", "reduced_model")
-IGNORED = {"runs", "dist", "build", "__pycache__", ".git", ".venv", ".hypothesis"}
+IGNORED = {"runs", "dist", "build", "__pycache__", ".git", ".venv", ".hypothesis", "mutants"}
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
@@ -19,6 +20,12 @@ def module_name(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+def offending(paths: Iterable[Path], found: Callable[[Path], object]) -> dict[str, object]:
+    """What a check finds in each file, of those in which it finds anything."""
+    return {str(path.relative_to(ROOT)): what for path in paths if (what := found(path))}
+
+
+@cache
 def tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 

@@ -3,9 +3,7 @@
 import ast
 import re
 
-import pytest
-
-from tests.house.source import PACKAGES, ROOT, Function, functions, module_name, python_files, texts, tree
+from tests.house.source import PACKAGES, ROOT, Function, functions, module_name, offending, python_files, texts, tree
 
 LONGEST_FUNCTION = 40
 LONGEST_FILE = 400
@@ -23,10 +21,6 @@ LATE_IMPORTS = {
 LATE_PACKAGES = ("fem_needle.cli", "reduced_model.commands")
 
 
-def by_name(paths):
-    return pytest.mark.parametrize("path", paths, ids=module_name)
-
-
 def code_lines(function):
     """Lines of a function without its docstring and decorators."""
     first = function.body[0]
@@ -40,14 +34,19 @@ def test_code_lines_counts_what_it_should():
     assert code_lines(function) == 3
 
 
-@by_name(SOURCE + python_files("docs", "benchmarks"))
-def test_functions_are_short(path):
-    assert {f.name: code_lines(f) for f in functions(path) if code_lines(f) > LONGEST_FUNCTION} == {}
+def test_functions_are_short():
+    def long(path):
+        return {f.name: code_lines(f) for f in functions(path) if code_lines(f) > LONGEST_FUNCTION}
+
+    assert offending(SOURCE + python_files("docs", "benchmarks"), long) == {}
 
 
-@by_name(SOURCE + python_files("tests", "docs", "benchmarks"))
-def test_files_are_short(path):
-    assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE
+def test_files_are_short():
+    def lines(path):
+        return len(path.read_text(encoding="utf-8").splitlines())
+
+    checked = SOURCE + python_files("tests", "docs", "benchmarks")
+    assert {path: lines(path) for path in checked if lines(path) > LONGEST_FILE} == {}
 
 
 def public_things(path):
@@ -61,28 +60,30 @@ def public_things(path):
                 yield node
 
 
-@by_name(SOURCE)
-def test_public_things_have_docstrings(path):
-    assert [getattr(node, "name", "module") for node in public_things(path) if not ast.get_docstring(node)] == []
+def test_public_things_have_docstrings():
+    def bare(path):
+        return [getattr(node, "name", "module") for node in public_things(path) if not ast.get_docstring(node)]
+
+    assert offending(SOURCE, bare) == {}
 
 
-@by_name(SOURCE)
-def test_imports_are_at_the_top(path):
-    module = module_name(path)
-    if module.startswith(LATE_PACKAGES):
-        return
-    late = {
-        function.name
-        for function in functions(path)
-        for node in ast.walk(function)
-        if isinstance(node, ast.Import | ast.ImportFrom)
-    }
-    assert {(module, name) for name in late} <= LATE_IMPORTS
+def late_imports(path):
+    """Yield (module, function) of each import inside a function."""
+    for function in functions(path):
+        if any(isinstance(node, ast.Import | ast.ImportFrom) for node in ast.walk(function)):
+            yield module_name(path), function.name
 
 
-@by_name(SOURCE)
-def test_input_is_not_checked_by_assert(path):
-    assert [node.lineno for node in ast.walk(tree(path)) if isinstance(node, ast.Assert)] == []
+def test_imports_are_at_the_top():
+    checked = [path for path in SOURCE if not module_name(path).startswith(LATE_PACKAGES)]
+    assert {late for path in checked for late in late_imports(path)} == LATE_IMPORTS
+
+
+def test_input_is_not_checked_by_assert():
+    def asserts(path):
+        return [node.lineno for node in ast.walk(tree(path)) if isinstance(node, ast.Assert)]
+
+    assert offending(SOURCE, asserts) == {}
 
 
 # Roots of machines, put together here so that this file does not name them.
