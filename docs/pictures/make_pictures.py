@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fem_needle import Layer, Scene, TipLoad, Trajectory, load_scene, run_scene
+from fem_needle import Scene, TipLoad, load_scene, run_scene
+from fem_needle.figures import picture_bytes, shapes, waterfall
 
 FOLDER = Path(__file__).parent
-MILLIMETERS = 1e3
 SHOWN_DEPTHS = (0.015, 0.04, 0.06, 0.08, 0.1)  # m
 BEVEL = TipLoad(bevel_coefficient=3e-5)  # m^2: a bevel that is steered by nobody else
 SHADES = ("#f4e3d2", "#e6bfa8")
@@ -22,8 +22,10 @@ INK = "#303030"
 def main() -> None:
     """Write every picture."""
     mpl.use("Agg")
-    for name, figure in (("needle_shapes.png", needle_shapes()), ("signs.png", signs())):
-        figure.savefig(FOLDER / name, dpi=130, metadata={"Software": None})
+    run = run_scene(beveled_scene(), analysis="quasi-static", elements=32, time_step=0.05)
+    for name, figure in (("needle_shapes.png", shapes(run, SHOWN_DEPTHS)), ("needle_waterfall.png", waterfall(run))):
+        (FOLDER / name).write_bytes(picture_bytes(figure))
+    signs().savefig(FOLDER / "signs.png", dpi=130, metadata={"Software": None})
 
 
 def beveled_scene() -> Scene:
@@ -31,45 +33,6 @@ def beveled_scene() -> Scene:
     scene = load_scene("brachytherapy")
     bevel = {"kind": "tip", "bevel_coefficient": BEVEL.bevel_coefficient}
     return scene.with_values({"loads": [*scene.to_dict()["loads"], bevel], "numerics.output_step": 0.1})
-
-
-def needle_shapes() -> Figure:
-    """Draw the brachytherapy needle with a beveled tip at several depths."""
-    run = run_scene(beveled_scene(), analysis="quasi-static", elements=32, time_step=0.05)
-    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
-    axes = figure.subplots()
-    largest = _draw_needles(axes, run)
-    low, high = -0.5 * largest, 1.3 * largest
-    for shade, layer in zip(SHADES, run.scene.tissue.layers, strict=True):
-        _draw_layer(axes, layer, shade, high)
-    (guide,) = run.scene.support.guides
-    axes.plot([MILLIMETERS * guide.position], [0.0], marker="D", color=INK, linestyle="none", zorder=4)
-    axes.annotate("template", (MILLIMETERS * guide.position, 0.0), (0, -22), textcoords="offset points", ha="center")
-    axes.set(xlim=(-190, 125), ylim=(low, high))
-    axes.set(xlabel="position along the insertion axis y [mm]; skin at 0", ylabel="deflection w [mm]")
-    axes.legend(title="depth z [mm]", loc="upper left", framealpha=1.0)
-    return figure
-
-
-def _draw_needles(axes: Axes, run: Trajectory) -> float:
-    """Draw a line for each shown depth and return the largest deflection [mm]."""
-    colors = mpl.colormaps["viridis"](np.linspace(0.0, 0.85, len(SHOWN_DEPTHS)))
-    largest = 0.0
-    for depth, color in zip(SHOWN_DEPTHS, colors, strict=True):
-        row = int(np.argmin(np.abs(run.depth - depth)))
-        along = MILLIMETERS * (run.arc_length - run.scene.needle.length + run.depth[row])
-        across = MILLIMETERS * run.station_deflection[row]
-        axes.plot(along, across, color=color, linewidth=2.0, label=f"{MILLIMETERS * depth:.0f}")
-        axes.plot(along[:1], across[:1], marker="s", color=color)
-        largest = max(largest, float(np.max(np.abs(across))))
-    return largest
-
-
-def _draw_layer(axes: Axes, layer: Layer, shade: str, height: float) -> None:
-    start, end = MILLIMETERS * layer.start, min(MILLIMETERS * layer.far_side, 125.0)
-    axes.axvspan(start, end, color=shade, zorder=0)
-    name = layer.name.replace(" and ", " and\n") + f"\n{layer.foundation_modulus / 1e3:g} kN/m$^2$"
-    axes.annotate(name, ((start + end) / 2, 0.97 * height), ha="center", va="top", fontsize=8)
 
 
 def signs() -> Figure:

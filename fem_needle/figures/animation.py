@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from matplotlib.animation import PillowWriter
@@ -13,7 +14,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from fem_needle.figures.common import MILLIMETERS, SMALL, name_figure, placed
-from fem_needle.figures.scenery import draw_scenery, magnification, set_limits, told
+from fem_needle.figures.scenery import PATH, draw_scenery, lateral_forces, magnification, set_limits, told
 from fem_needle.figures.tissue import figure_with_tissue
 from fem_needle.pictures import COLORS, INK, new_figure, shared_style
 from fem_needle.trajectory import Trajectory
@@ -68,8 +69,11 @@ def _prepare(figure: Figure, axes: Axes, strip: Axes, run: Trajectory) -> tuple[
     (tip,) = axes.plot([], [], marker="o", markersize=5, color=COLORS[0], linestyle="none", zorder=4)
     (way,) = axes.plot([], [], color=COLORS[2], linestyle=(0, (5, 2)), linewidth=1.4, label="way of the tip", zorder=2)
     lines = [needle, tip, way]
+    point: dict[str, Any] = {"markersize": 7, "linestyle": "none", "zorder": 4}
     if run.scene.support.kind == "hub":
-        lines += axes.plot([], [], marker="s", markersize=7, color=INK, linestyle="none", label="hub", zorder=4)
+        lines += axes.plot([], [], marker="s", color=INK, label="hub", **point)
+        for number, _ in enumerate(lateral_forces(run, 0)):
+            lines += axes.plot([], [], marker="^", color=PATH, label="_" * bool(number) + "lateral force", **point)
     figure.legend(loc="outside right center", frameon=False, fontsize=SMALL + 0.5)
     name_figure(figure, run)
     strip.set_title("t = 0 s", loc="left")
@@ -85,7 +89,11 @@ def _show(lines: list[Line2D], strip: Axes, run: Trajectory, row: int, magnified
     needle.set_data(along, across)
     tip.set_data(along[-1:], across[-1:])
     way.set_data(MILLIMETERS * run.depth[: row + 1], MILLIMETERS * run.tip_deflection[: row + 1])
-    for marker in hub:
-        marker.set_data(along[:1], across[:1])
+    if hub:
+        hub[0].set_data(along[:1], across[:1])
+    for marker, (place, force) in zip(hub[1:], lateral_forces(run, row), strict=True):
+        acting = [place] if force else []
+        marker.set_data(acting, np.interp(acting, along, across))
+        marker.set_marker("^" if force > 0.0 else "v")
     digits = max(0, 2 - int(np.floor(np.log10(max(float(run.time[-1]), 1e-9)))))
     strip.set_title(f"t = {run.time[row]:.{digits}f} s, {MILLIMETERS * run.depth[row]:.1f} mm deep, {magnified}", loc="left")
