@@ -66,32 +66,22 @@ def write_pictures(
     ComputationError
         If a file cannot be written.
     """
-    contents = _contents(run, kinds, formats, depths)
-    if animate:
-        contents[ANIMATION] = lambda: animated_gif(run)
-    for name in contents:
-        check_target(folder / name, force=force)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, content in contents.items():
-            write_atomically(folder / name, content())
-    except OSError as error:
-        raise ComputationError(f"{folder}: pictures cannot be written: {error.strerror or error}") from error
-    return tuple(folder / name for name in contents)
-
-
-def _contents(
-    run: Trajectory, kinds: Sequence[str], formats: Sequence[str], depths: Sequence[float] | None
-) -> dict[str, Callable[[], bytes]]:
-    """Return what draws each file, by its name."""
     _check_choices("kind", kinds, KINDS)
     _check_choices("format", formats, FORMATS)
+    names = {f"{PICTURES[kind]}.{ending}": (kind, ending) for kind in kinds for ending in formats}
+    targets = [folder / name for name in (*names, *([ANIMATION] if animate else []))]
+    for target in targets:
+        check_target(target, force=force)
     drawn = {kind: shapes(run, depths) if kind == "shapes" else _DRAWN[kind](run) for kind in dict.fromkeys(kinds)}
-    return {
-        f"{PICTURES[kind]}.{ending}": (lambda figure=figure, ending=ending: picture_bytes(figure, ending))  # type: ignore[misc]
-        for kind, figure in drawn.items()
-        for ending in dict.fromkeys(formats)
-    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, (kind, ending) in names.items():
+            write_atomically(folder / name, picture_bytes(drawn[kind], ending))
+        if animate:
+            write_atomically(folder / ANIMATION, animated_gif(run))
+    except OSError as error:
+        raise ComputationError(f"{folder}: pictures cannot be written: {error.strerror or error}") from error
+    return tuple(targets)
 
 
 def _check_choices(name: str, given: Sequence[str], allowed: Sequence[str]) -> None:

@@ -1,0 +1,160 @@
+"""Pictures show the numbers of the run, in the units that they name."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from fem_needle import SceneError, Trajectory
+from fem_needle.figures import courses, energies, shapes, tip_path, waterfall
+from tests.unit.figures.runs import run_named
+
+SIZES = {"J": 1.0, "mJ": 1e-3, "µJ": 1e-6, "nJ": 1e-9, "pJ": 1e-12, "N": 1.0, "mN": 1e-3, "µN": 1e-6, "mm": 1e-3}
+
+
+def lines(axes):
+    return {str(line.get_label()): line for line in axes.lines}
+
+
+def panel(figure, title):
+    return next(axes for axes in figure.axes if axes.get_title(loc="left").startswith(title))
+
+
+def si(axes, name):
+    """Return a curve in SI by the unit that its axis names."""
+    [unit] = re.findall(r"\[(\S+)\]", axes.get_ylabel())
+    return SIZES[unit] * np.asarray(lines(axes)[name].get_ydata())
+
+
+def test_a_shape_is_the_needle_at_its_depth_in_millimeters():
+    run = run_named("hub")
+    curves = lines(shapes(run, [0.03, 0.06]).axes[1])
+    for depth in (0.03, 0.06):
+        row = int(np.argmin(np.abs(run.depth - depth)))
+        line = curves[f"{1e3 * run.depth[row]:.4g} mm deep"]
+        np.testing.assert_allclose(line.get_xdata(), 1e3 * (run.arc_length - 0.2 + run.depth[row]), atol=1e-12)
+        np.testing.assert_allclose(line.get_ydata(), 1e3 * run.station_deflection[row], atol=1e-15)
+
+
+def test_under_entry_a_shape_goes_through_the_clamp():
+    line = lines(shapes(run_named("entry"), [0.1]).axes[1])["100 mm deep"]
+    places, deflections = line.get_data()
+    assert 0.0 in places
+    assert np.all(deflections[places <= 0.0] == 0.0)
+    assert places[-1] == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("name", ["entry", "hub"])
+def test_the_magnification_is_that_of_the_drawn_axes(name):
+    figure = shapes(run_named(name))
+    figure.draw_without_rendering()
+    axes = figure.axes[1]
+    origin, across, up = axes.transData.transform([(0, 0), (1, 0), (0, 1)])
+    [told] = re.findall(r"magnified (\S+) times", figure.axes[0].get_title(loc="left"))
+    assert float(told) == pytest.approx((up[1] - origin[1]) / (across[0] - origin[0]), rel=0.05)
+    assert up[1] > origin[1] and across[0] > origin[0]  # positive deflections up, insertion to the right
+
+
+@pytest.mark.parametrize("depths", [[0.5], [0.05, -0.01], [float("nan")], []])
+def test_depths_that_the_run_has_not_are_refused(depths):
+    with pytest.raises(SceneError, match=r"depths: .*allowed"):
+        shapes(run_named("hub"), depths)
+
+
+def test_layers_are_named_with_their_moduli():
+    found = [text.get_text() for text in shapes(run_named("hub")).findobj(match=Text)]
+    texts = " ".join(" ".join(found).split())
+    assert "prostate region, 20 kN/m²" in texts and "fat and muscle, 5 kN/m²" in texts
+
+
+def test_guide_hub_target_force_and_cut_path_are_drawn():
+    _, labels = shapes(run_named("loop")).axes[1].get_legend_handles_labels()
+    assert {"guide on a spring", "hub", "target", "lateral force"} <= set(labels)
+    run = run_named("cut path")
+    cut = lines(shapes(run).axes[1])["path that the tip cut"]
+    np.testing.assert_allclose(cut.get_ydata(), 1e3 * run.path_deflection)
+
+
+def test_the_path_of_the_tip_is_its_deflection_over_its_place():
+    run = run_named("back")
+    line = lines(tip_path(run).axes[1])["tip"]
+    np.testing.assert_allclose(line.get_xdata(), 1e3 * run.depth)
+    np.testing.assert_allclose(line.get_ydata(), 1e3 * run.tip_deflection)
+
+
+def test_a_held_tip_is_drawn_over_the_time():
+    run, [axes] = run_named("hold"), tip_path(run_named("hold")).axes
+    assert (axes.get_xlabel(), axes.get_title(loc="left")) == ("time [s]", "Tip, held 100 mm deep")
+    np.testing.assert_array_equal(lines(axes)["tip"].get_xdata(), run.time)
+
+
+def test_dots_of_the_path_are_the_readings_of_the_loop():
+    run = run_named("loop")
+    dots = lines(tip_path(run).axes[1])["latest measurement"].get_ydata()
+    readings = 1e3 * run.signals["measurement_tip_deflection"]
+    assert len(dots) > 3 and set(dots) <= set(readings)
+
+
+def test_courses_are_the_series():
+    run, figure = run_named("hub"), courses(run_named("hub"))
+    axial, lateral = panel(figure, "Axial"), panel(figure, "Lateral")
+    np.testing.assert_allclose(si(panel(figure, "Tip"), "deflection"), run.tip_deflection, rtol=1e-12)
+    np.testing.assert_allclose(si(axial, "push"), run.push_force, rtol=1e-12)
+    np.testing.assert_allclose(si(axial, "friction"), run.friction_force, rtol=1e-12)
+    for name, values in (("tissue", run.tissue_force), ("hub", run.hub_force), ("guide", run.guide_force[:, 0])):
+        np.testing.assert_allclose(si(lateral, name), values, rtol=1e-12)
+
+
+def test_courses_show_the_command_of_a_loop():
+    run = run_named("loop")
+    axes = panel(courses(run), "Command: lateral force")
+    np.testing.assert_allclose(si(axes, "lateral force"), run.signals["command_lateral_force"])
+
+
+def test_energies_are_the_ledger_and_name_what_is_zero():
+    run = run_named("hub")
+    figure = energies(run)
+    stored, works = panel(figure, "Stored"), panel(figure, "Lateral works")
+    np.testing.assert_allclose(si(stored, "bending"), run.bending_energy, rtol=1e-12)
+    np.testing.assert_allclose(si(works, "loads"), run.load_work, rtol=1e-12)
+    assert "hub" not in lines(works) and not np.any(run.hub_work)
+    assert panel(energies(run_named("still")), "Stored").get_title(loc="left") == "Stored, lateral: zero throughout"
+
+
+def test_energies_that_a_loop_left_out_are_said_to_be_missing():
+    assert panel(energies(run_named("loop")), "Lateral works").get_title(loc="left") == "Lateral works: not computed"
+
+
+def test_the_waterfall_is_the_deflection_over_arc_length_and_time():
+    run = run_named("hub")
+    left, right = waterfall(run).axes[:2]
+    [cells] = [one for one in right.collections if one.get_array() is not None]
+    np.testing.assert_allclose(np.reshape(cells.get_array(), run.station_deflection.shape), 1e3 * run.station_deflection)
+    low, high = cells.get_clim()
+    assert (-low, high) == (high, pytest.approx(1e3 * np.max(np.abs(run.station_deflection))))
+    skin = lines(right)["skin"]
+    np.testing.assert_allclose(skin.get_xdata(), 1e3 * (0.2 - run.depth))
+    assert left.get_ylabel() == "time [s]"
+
+
+def test_the_bar_of_the_stacked_curves_has_the_length_that_it_tells():
+    run = run_named("hub")
+    left = waterfall(run).axes[0]
+    bar, name = left.texts
+    size = float(name.get_text().removesuffix(" mm"))
+    curve = next(line for line in left.lines if line.get_ydata()[0] == run.time[8] and len(line.get_xdata()) > 2)
+    stretch = (curve.get_ydata()[-1] - run.time[8]) / (1e3 * run.tip_deflection[8])
+    assert bar.xy[1] - bar.xyann[1] == pytest.approx(size * stretch)
+
+
+def test_a_loaded_run_gives_the_same_picture(tmp_path):
+    run = run_named("hub")
+    run.save(tmp_path / "run")
+    loaded = Trajectory.load(tmp_path / "run")
+    for draw in (shapes, tip_path):
+        first, second = (draw(one).axes[1].lines for one in (run, loaded))
+        for line, other in zip(first, second, strict=True):
+            np.testing.assert_allclose(line.get_ydata(), other.get_ydata(), atol=1e-12)
