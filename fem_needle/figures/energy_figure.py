@@ -82,8 +82,8 @@ def _panel(run: Trajectory, title: str, names: dict[str, str]) -> Panel:
     curves = {names[name]: values / size for name, values in drawn.items()}
     relative = run.summary.get("relative_energy_residual")
     if title == RESIDUALS and curves:
-        told = f"; lateral at most {relative:.1e} of the largest energy" if "lateral" in curves and relative is not None else ""
-        title = f"{title}: {' and '.join(curves)}{told}"
+        told = "" if relative is None else f" (at most {relative:.1e} of the largest energy)"
+        title = f"{title}: {' and '.join(name + told * (name == 'lateral') for name in curves)}"
     elif len(curves) == 1:
         title = f"{title}: {next(iter(curves))}"
     elif not curves:

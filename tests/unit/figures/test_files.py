@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from io import BytesIO
 from itertools import pairwise
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from fem_needle import SceneError
+from fem_needle import ComputationError, SceneError
 from fem_needle.figures import FORMATS, KINDS, animated_gif, courses, picture_bytes, shapes, tip_path, waterfall, write_pictures
 from fem_needle.figures.animation import frame_rows
 from fem_needle.run_target import FILES, PICTURES
@@ -123,3 +124,12 @@ def test_a_picture_that_cannot_be_written_is_told(folder):
     (folder / "shapes.png").mkdir()
     with pytest.raises(SceneError, match="it is a folder"):
         write_pictures(run_named("hub"), folder, ["shapes"], force=True)
+
+
+def test_a_full_disk_is_told(folder, monkeypatch):
+    def full(path, content):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("fem_needle.figures.files.write_atomically", full)
+    with pytest.raises(ComputationError, match=r"pictures cannot be written: No space left on device"):
+        write_pictures(run_named("hold"), folder, ["tip-path"])
