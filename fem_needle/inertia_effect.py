@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from fem_needle import banded
-from fem_needle.free_response import frozen_matrices, ringing
+from fem_needle.free_response import ROUNDING, frozen_matrices, ringing
 from fem_needle.limits import check_swings
 from fem_needle.march import TimeGrid, march
 from fem_needle.motion import DepthLaw, depth_law, landing_times, run_duration, shortest_period
@@ -157,6 +157,8 @@ def _struck(pieces: list[_Piece], jump: Array) -> float:
     first = pieces[0]
     plant, start = first.plant, (float(first.depths[0]), float(first.times[0]))
     rung = ringing(plant, *start, jump)
+    if not rung:  # also a needle that rigid guides leave no freedom
+        return 0.0
     frequencies, momenta, tips = _vibrations(plant, *start, jump)
     places = [(float(p.depths[i]), float(p.times[i])) for p in pieces for i in (0, len(p.times) // 2, -1)]
     swings = [float(np.sum(momenta * tips / frequencies))]
@@ -174,4 +176,4 @@ def _vibrations(plant: Plant, depth: float, time: float, jump: Array) -> tuple[A
     squares, vectors = eigh(stiffness, mass)
     struck = vectors.T @ (basis @ jump[plant.prescribed :])
     tips = (basis @ plant.points(depth).rows[-1, plant.prescribed :]) @ vectors
-    return np.sqrt(np.maximum(squares, squares[-1] * 1e-15)), np.abs(struck), np.abs(tips)
+    return np.sqrt(np.maximum(squares, squares[-1] * ROUNDING)), np.abs(struck), np.abs(tips)

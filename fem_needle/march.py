@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
@@ -218,19 +219,33 @@ def pass_landing(
         held = energies(before.stage, solution, inertia=stepper.inertia).total
         dropped = trivial_solution(plant, before.stage)
         return StepEnd(before.stage, dropped), Works(boundary_energy=-held)
-    after = stepper.start(law, time, until, before)
+    with failing_as_step(time, law.depth(time)):
+        after = stepper.start(law, time, until, before)
     return after, landing_works(before, after, inertia=stepper.inertia)
 
 
 def _advance(plant: Plant, stepper: Stepper, law: Motion, state: StepEnd, until: float, last: Step | None) -> Step:
     time = state.stage.instant.time
-    try:
+    with failing_as_step(time, law.depth(time)):
         step = stepper.advance(law, state, until, last)
-    except (SingularMatrixError, np.linalg.LinAlgError, FloatingPointError) as error:
-        raise failed_step(time, law.depth(time), str(error)) from error
     if not np.all(np.isfinite(step.ends[1].solution.coordinates)):
         raise failed_step(time, law.depth(time), "the deflection is not finite")
     return step
+
+
+@contextmanager
+def failing_as_step(time: float, depth: float) -> Iterator[None]:
+    """Let failures of linear algebra say where they happened.
+
+    Raises
+    ------
+    ComputationError
+        In place of them.
+    """
+    try:
+        yield
+    except (SingularMatrixError, np.linalg.LinAlgError, FloatingPointError) as error:
+        raise failed_step(time, depth, str(error)) from error
 
 
 def failed_step(time: float, depth: float, what: str) -> ComputationError:

@@ -10,7 +10,7 @@ from fem_needle.choices import Choice
 from fem_needle.collocation import collocation
 from fem_needle.errors import ComputationError
 from fem_needle.loops import run_loop
-from fem_needle.march import RunEnd, TimeGrid, time_grid
+from fem_needle.march import RunEnd, TimeGrid, failing_as_step, time_grid
 from fem_needle.modal_stepper import ModalStepper, needs_no_steps
 from fem_needle.models import ChosenPlant
 from fem_needle.plant import Plant
@@ -146,8 +146,10 @@ def collect(job: Job, grid: TimeGrid, samples: list[Sample], *, live: bool) -> R
     try:
         marching = run_loop(job.plant, stepper_of(job), grid)
         while True:
+            last = samples[-1] if samples else None
             try:
-                sample = next(marching)
+                with failing_as_step(last.time if last else 0.0, last.depth if last else job.scene.insertion.first_depth):
+                    sample = next(marching)
             except StopIteration as finished:
                 return finished.value
             samples.append(sample)

@@ -140,11 +140,13 @@ class DynamicStepper:
         """Let a needle without inertia follow a jump of the loads or of the hub: what no viscosity holds moves at once."""
         instant = start.stage.instant
         frozen = _Frozen(replace(instant, speed=0.0, acceleration=0.0))
-        length = JUMP_FRACTION * (until - instant.time)
+        # Long enough to be told from the instant itself: after a kink a few ulps of the time may be all that is left.
+        ending = max(instant.time + JUMP_FRACTION * (until - instant.time), nextafter(instant.time, inf))
+        length = ending - instant.time
         rates = np.zeros(2)
         if jump is not None:
             rates[: len(jump)] = jump / length
-        step = self._attempt(frozen, start, instant.time + length, None, None, rates)
+        step = self._attempt(frozen, start, ending, None, None, rates)
         return StepEnd(start.stage, step.ends[1].solution, start.path)
 
     def advance(self, law: Motion, start: StepEnd, until: float, last: Step | None) -> Step:

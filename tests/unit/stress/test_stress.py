@@ -172,3 +172,16 @@ def test_the_command_runs_its_cases_in_processes(stress):
     status, out, err = stress("--scenes", "1", "--processes", "2")
     assert status == 0, err
     assert "random scenes, finite elements" in out
+
+
+@pytest.mark.parametrize("seed", [2106, 2453])
+def test_scenes_that_once_crashed(seed):
+    """A guide within a nanometre of another; an interface crossed 1e-12 m after a kink, a few ulps of the time."""
+    found = examine("once", random_numbers(seed), None)
+    assert found.crash == "" and found.announced
+
+
+def test_guides_that_leave_no_freedom():
+    """Three rigid guides on the three coordinates of one element: nothing can ring."""
+    found = examine("held", replace(random_numbers(4756), elements=1), None)
+    assert found.crash == ""
