@@ -53,6 +53,12 @@ def placed(run: Trajectory, row: int) -> tuple[Array, Array]:
     return MILLIMETERS * along, MILLIMETERS * across
 
 
+def largest_deflection(run: Trajectory) -> float:
+    """Return the largest magnitude of all deflections [m] that are finite."""
+    finite = run.station_deflection[np.isfinite(run.station_deflection)]
+    return float(np.max(np.abs(finite), initial=0.0))
+
+
 def limits_of(values: Array, least: float) -> tuple[float, float]:
     """Return limits of an axis that hold all finite values and 0 with a margin; -1 and 1 where nothing exceeds ``least``."""
     finite = values[np.isfinite(values)]

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fem_needle.figures.common import LEAST_RANGE, MILLIMETERS, limits_of, placed
+from fem_needle.figures.common import LEAST_RANGE, MILLIMETERS, largest_deflection, limits_of, placed
 from fem_needle.figures.tissue import draw_tissue
 from fem_needle.pictures import COLORS, INK
 from fem_needle.scene import LateralLoad, as_function
@@ -105,6 +105,6 @@ def magnification(figure: Figure, axes: Axes) -> float:
 
 def told(run: Trajectory, factor: float) -> str:
     """Return a magnification in words, or that nothing bends."""
-    if float(np.max(np.abs(run.station_deflection))) <= LEAST_RANGE * run.scene.needle.length:
+    if largest_deflection(run) <= LEAST_RANGE * run.scene.needle.length:
         return "no deflection"
     return f"deflections magnified {factor:.2g} times" if factor < 99.5 else f"deflections magnified {factor:.0f} times"

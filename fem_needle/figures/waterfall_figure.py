@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fem_needle.figures.common import LEAST_RANGE, MILLIMETERS, SMALL, moves, name_figure
+from fem_needle.figures.common import LEAST_RANGE, MILLIMETERS, SMALL, largest_deflection, moves, name_figure
 from fem_needle.pictures import COLORS, INK, new_figure, shared_style
 from fem_needle.trajectory import Trajectory
 
@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 WIDTH, HEIGHT = 9.0, 5.2  # inches
 CURVES = 24  # at most, stacked
 MOST_CELLS = 400  # of the map, along each side
+MOST_INTERFACES = 12  # that are drawn
 OVERLAP = 2.5  # spacings of two curves that the largest deflection takes
 MAP = "RdBu_r"  # white at zero, told apart by color-blind readers
 
@@ -38,7 +39,7 @@ def waterfall(run: Trajectory) -> Figure:
     with shared_style():
         figure = new_figure(WIDTH, HEIGHT)
         left, right = figure.subplots(1, 2, sharex=True)
-        largest = MILLIMETERS * float(np.max(np.abs(run.station_deflection)))
+        largest = MILLIMETERS * largest_deflection(run)
         if largest <= LEAST_RANGE * MILLIMETERS * run.scene.needle.length:
             largest = 0.0
         low, high = _time_limits(run)
@@ -76,7 +77,8 @@ def _draw_curves(axes: Axes, run: Trajectory, largest: float, duration: float) -
     if moves(run):
         axes.plot(*_skin(run), color=INK, linestyle=(0, (5, 2)), linewidth=1.4, zorder=4)
     low, high = _time_limits(run)
-    shapes = run.time[rows, None] + stretch * MILLIMETERS * run.station_deflection[rows]
+    deflections = run.station_deflection[rows]
+    shapes = run.time[rows, None] + stretch * MILLIMETERS * np.where(np.isfinite(deflections), deflections, 0.0)
     space = 0.02 * duration
     top, size = max(high, float(np.max(shapes))) + space, _round_number(largest) if stretch else 0.0
     axes.set_ylim(min(low, float(np.min(shapes))) - space, top + stretch * size + space * bool(stretch))
@@ -119,9 +121,9 @@ def _draw_map(figure: Figure, axes: Axes, run: Trajectory, largest: float) -> No
 
 
 def _draw_interfaces(axes: Axes, run: Trajectory) -> None:
-    """Draw where on the needle the layers begin, below the skin."""
+    """Draw where on the needle the layers begin, below the skin; of many layers nothing, for they would hide the map."""
     starts = sorted({layer.start for layer in run.scene.tissue.layers if layer.start > 0.0})
-    for number, start in enumerate(starts):
+    for number, start in enumerate(starts if len(starts) <= MOST_INTERFACES else ()):
         place = MILLIMETERS * (run.scene.needle.length - run.depth + start)
         inside = np.where(run.depth >= start, place, np.nan)
         label = "_interface" if number else "interface of layers"

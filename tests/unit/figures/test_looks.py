@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
+import numpy as np
 import pytest
 
 from fem_needle.figures import courses, energies, shapes, tip_path, waterfall
@@ -54,3 +56,12 @@ def test_no_needle_runs_out_of_the_picture(name):
         places, deflections = line.get_data()
         assert max(places) <= right and bottom <= min(deflections) and max(deflections) <= top
         assert min(places) >= left or run_named(name).scene.support.kind == "entry"
+
+
+@pytest.mark.parametrize("kind", DRAWN)
+def test_a_run_that_ends_in_nothing_finite_is_drawn_up_to_there(kind):
+    run = run_named("hub")
+    broken, tip = run.station_deflection.copy(), run.tip_deflection.copy()
+    broken[-1], tip[-1] = np.nan, np.nan
+    figure = DRAWN[kind](replace(run, station_deflection=broken, series=run.series | {"tip_deflection": tip}, plant=None))
+    assert figure.axes and all(np.isfinite([*axes.get_xlim(), *axes.get_ylim()]).all() for axes in figure.axes)
