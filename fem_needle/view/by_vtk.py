@@ -10,7 +10,7 @@ import pyvista as pv
 
 from fem_needle.pictures import INK
 from fem_needle.view.arrangement import Arrangement
-from fem_needle.view.drawing import Drawing, Part, drawing, moving_parts
+from fem_needle.view.drawing import LEGEND, Drawing, Part, drawing, moving_parts
 from fem_needle.view.solids import Surface
 
 SIZE = (1400, 700)
@@ -30,27 +30,30 @@ def render(drawn: Drawing, window: str) -> tuple[int, int, bytes]:
 def show(arranged: Arrangement, row: int) -> None:
     """Open a window on the display; its slider moves the needle."""
     plotter: Any = pv.Plotter(window_size=list(SIZE), title="fem-needle view")
-    actors = _fill(plotter, drawing(arranged, row))
+    _fill(plotter, drawing(arranged, row))
 
-    def move(value: float) -> None:
-        chosen = round(value)
-        pose = arranged.pose(chosen)
+    def move(time: float) -> None:
+        pose = arranged.pose(arranged.row(time))
         for part in moving_parts(pose):
-            actor = actors.get(part.name)
-            if actor is not None and len(part.surface.triangles):
-                actor.mapper.dataset.copy_from(_poly_data(part.surface))
+            plotter.remove_actor(part.name, reset_camera=False)
+            if len(part.surface.triangles):
+                _add(plotter, part)
         _write(plotter, f"{pose.caption}\n{arranged.note}", (0.02, 0.03), name="caption")
 
-    last = len(arranged.run.time) - 1
-    if last:
-        plotter.add_slider_widget(move, [0, last], value=row, title="sample", pointa=(0.65, 0.1), pointb=(0.95, 0.1))
+    times = arranged.run.time
+    if len(times) > 1:
+        plotter.add_slider_widget(
+            move, [float(times[0]), float(times[-1])], value=float(times[row]), title="time [s]", pointa=(0.62, 0.12),
+            pointb=(0.95, 0.12), color=INK, slider_width=0.02, tube_width=0.004, fmt="{:.4g}",
+        )  # fmt: skip
     plotter.show()
 
 
-def _fill(plotter: Any, drawn: Drawing) -> dict[str, Any]:
-    """Add everything to an empty scene and return what may move."""
+def _fill(plotter: Any, drawn: Drawing) -> None:
+    """Add everything to an empty scene."""
     plotter.set_background("white")
-    actors = {part.name: _add(plotter, part) for part in drawn.parts}
+    for part in drawn.parts:
+        _add(plotter, part)
     for color, points in drawn.lines:
         plotter.add_mesh(pv.MultipleLines(points), color=color, line_width=2)
     for label in drawn.labels:  # one by one: VTK leaves out those that it thinks too near to others
@@ -60,23 +63,23 @@ def _fill(plotter: Any, drawn: Drawing) -> dict[str, Any]:
         )  # fmt: skip
     _write(plotter, drawn.title, (0.02, 0.94), size=TEXT + 2)
     _write(plotter, f"{drawn.caption}\n{drawn.note}", (0.02, 0.03), name="caption")
-    for number, part in enumerate(part for part in drawn.parts if part.opacity == 1.0):
-        _write(plotter, part.name, (0.76, 0.86 - 0.045 * number), color=part.color)
+    for number, (name, color) in enumerate(LEGEND):
+        _write(plotter, name, (0.76, 0.86 - 0.045 * number), color=color)
     plotter.enable_parallel_projection()
     plotter.view_vector((0.28, 0.32, 1.0), viewup=(0.0, 1.0, 0.0))
     plotter.camera.zoom(1.55)
-    return actors
 
 
 def _write(plotter: Any, text: str, place: tuple[float, float], *, size: int = TEXT, color: str = INK, name: str = "") -> None:
     plotter.add_text(text, position=place, viewport=True, font_size=size, color=color, name=f"text {name or text}")
 
 
-def _add(plotter: Any, part: Part) -> Any:
+def _add(plotter: Any, part: Part) -> None:
     solid = part.opacity == 1.0
-    return plotter.add_mesh(
-        _poly_data(part.surface), color=part.color, opacity=part.opacity, smooth_shading=solid, name=part.name, ambient=0.35
-    )
+    plotter.add_mesh(
+        _poly_data(part.surface), color=part.color, opacity=part.opacity, smooth_shading=solid, name=part.name, ambient=0.35,
+        reset_camera=False,
+    )  # fmt: skip
 
 
 def _poly_data(surface: Surface) -> Any:

@@ -13,6 +13,7 @@ from fem_needle.view.solids import Surface
 Array = NDArray[np.float64]
 
 NEEDLE, LOAD, REACTION, PLATE, PATH = "#303030", "#D55E00", "#0072B2", "#777777", "#CC79A7"
+LEGEND = (("needle", NEEDLE), ("loads on the needle", LOAD), ("forces of its supports", REACTION))
 LAYERS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442")  # Okabe and Ito: told apart by color-blind readers
 LAYER_OPACITY = 0.22
 RULER, RULER_TICK, RULER_TEXT = 1.2, 1.3, 1.62  # half widths of the block below the axis
@@ -89,11 +90,8 @@ def still_parts(arranged: Arrangement) -> tuple[Part, ...]:
 
 def moving_parts(pose: Pose) -> tuple[Part, ...]:
     """Return needle and arrows."""
-    return (
-        Part("needle", pose.needle, NEEDLE),
-        Part("loads on the needle", pose.loads, LOAD),
-        Part("forces of its supports", pose.reactions, REACTION),
-    )
+    surfaces = (pose.needle, pose.loads, pose.reactions)
+    return tuple(Part(name, surface, color) for (name, color), surface in zip(LEGEND, surfaces, strict=True))
 
 
 def layer_labels(arranged: Arrangement) -> tuple[Label, ...]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
@@ -159,6 +161,37 @@ def test_vtk_draws_the_needle(arranged, tmp_path):
     assert len(colors(tmp_path / "a.png")) > 20
     write_picture(arrangement(arranged.run, 5 * arranged.magnification), 6, tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() != (tmp_path / "b.png").read_bytes()
+
+
+WINDOW = """
+import os, sys
+os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
+from pathlib import Path
+import pyvista as pv
+from fem_needle.run_folder import load_run
+from fem_needle.view import arrangement
+from fem_needle.view.by_vtk import show
+
+pv.OFF_SCREEN = True
+moves = []
+def kept(plotter, move, *_, **__):
+    moves.append(move)
+def shown(plotter):
+    print(plotter.actors["needle"].bounds[1])
+    moves[0](0.0)
+    print(plotter.actors["needle"].bounds[1])
+pv.Plotter.add_slider_widget, pv.Plotter.show = kept, shown
+show(arrangement(load_run(Path(sys.argv[1]))), 6)
+"""
+
+
+@pytest.mark.slow
+def test_the_slider_of_the_window_moves_the_needle(arranged, tmp_path):
+    save_run(arranged.run, tmp_path / "run", vtk=False)
+    done = subprocess.run([sys.executable, "-c", WINDOW, str(tmp_path / "run")], capture_output=True, text=True, check=False)
+    if done.returncode < 0:
+        pytest.skip("no GL here")
+    assert [float(line) for line in done.stdout.split()] == pytest.approx([80.0, 20.0], abs=0.01), done.stderr
 
 
 @pytest.fixture
