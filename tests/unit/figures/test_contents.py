@@ -47,7 +47,7 @@ def test_under_entry_a_shape_goes_through_the_clamp():
     assert places[-1] == pytest.approx(100.0)
 
 
-@pytest.mark.parametrize("name", ["entry", "hub"])
+@pytest.mark.parametrize("name", ["entry", pytest.param("cut path", marks=pytest.mark.slow)])
 def test_the_magnification_is_that_of_the_drawn_axes(name):
     figure = shapes(run_named(name))
     figure.draw_without_rendering()

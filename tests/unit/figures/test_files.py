@@ -50,7 +50,7 @@ def test_an_unknown_format_is_refused():
 
 
 def test_a_moving_picture_moves_from_the_first_to_the_last_sample():
-    run = cut_off(run_named("hub"), 6)
+    run = cut_off(run_named("hub"), 4)
     content = animated_gif(run)
     frames = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(Image.open(BytesIO(content)))]
     assert len(frames) == len(run.time) and len(content) < 3e6
@@ -89,7 +89,7 @@ def test_the_command_draws_what_is_asked_for_where_it_is_asked_for(folder, tmp_p
     arguments = ("--kind", "tip-path", "--format", "svg", "--format", "pdf", "--out", tmp_path / "new" / "place")
     assert command_line("plot", folder, *arguments)[0] == 0
     assert {path.name for path in (tmp_path / "new" / "place").iterdir()} == {"tip_path.svg", "tip_path.pdf"}
-    assert command_line("plot", folder, *arguments, "--force")[0] == 0
+    assert command_line("plot", folder, *arguments[:4], *arguments[6:], "--force")[0] == 0
 
 
 @pytest.mark.parametrize(
