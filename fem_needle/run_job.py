@@ -18,9 +18,7 @@ from fem_needle.samples import Sample
 from fem_needle.scene import Scene
 from fem_needle.skipping import inertia_free_stepper
 from fem_needle.steppers import DynamicStepper, Inviscid, StaticStepper, Stepper
-from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
-
-ENERGY_BOUND = 0.01  # of the largest energy: a ledger that misses more says that the answer is not to be trusted
+from fem_needle.trajectory import Trajectory, energy_warnings, summary_of, trajectory_from_samples
 
 
 class Observer(Protocol):
@@ -175,7 +173,7 @@ def trajectory_of(job: Job, grid: TimeGrid, samples: list[Sample], time_error: f
         | summary_of(run)
         | {
             "error_estimate": estimate,
-            "warnings": [*_warnings(job), *_energy_warnings(run)],
+            "warnings": [*_warnings(job), *energy_warnings(run)],
             "stop_reason": end.reason,
             "steps": end.steps,
             "step_unknowns": end.steps * job.plant.size,
@@ -184,16 +182,6 @@ def trajectory_of(job: Job, grid: TimeGrid, samples: list[Sample], time_error: f
         }
     )
     return run
-
-
-def _energy_warnings(run: Trajectory) -> list[str]:
-    residual = float(summary_of(run)["relative_energy_residual"])
-    if residual <= ENERGY_BOUND:
-        return []
-    return [
-        f"energies miss by {residual:.2g} of the largest > {ENERGY_BOUND:g}: the time step does not resolve the motion, "
-        "or something snaps; try a smaller time_step"
-    ]
 
 
 def _settings(job: Job, grid: TimeGrid) -> dict[str, Any]:

@@ -50,6 +50,7 @@ VARIABLES: dict[str, tuple[str, str]] = {
 }
 
 SAME_STATION = 1e-6  # of the length
+ENERGY_BOUND = 0.01  # of the largest energy: a ledger that misses more says that the answer is not to be trusted
 _RATIOS = ("error_estimate", "relative_energy_residual")
 
 _FROM_SAMPLES = tuple(
@@ -225,6 +226,17 @@ def _hub_angles(plant: Plant, samples: Sequence[Sample]) -> Array:
     if support.hub_rotational_inertia is None:
         return np.zeros(len(samples))
     return twice_integrated(as_function(support.hub_torque), [s.time for s in samples]) / support.hub_rotational_inertia
+
+
+def energy_warnings(run: Trajectory) -> list[str]:
+    """Return the warning of a run whose energies miss too much."""
+    residual = float(summary_of(run)["relative_energy_residual"])
+    if residual <= ENERGY_BOUND:
+        return []
+    return [
+        f"energies miss by {residual:.2g} of the largest > {ENERGY_BOUND:g}: the time step does not resolve the motion, "
+        "or something snaps; try a smaller time_step"
+    ]
 
 
 def summary_of(run: Trajectory) -> dict[str, Any]:

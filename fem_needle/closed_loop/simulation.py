@@ -28,7 +28,7 @@ from fem_needle.scene import Scene
 from fem_needle.sensing.rig import SensorRig
 from fem_needle.skipping import Skipped, unneeded_terms
 from fem_needle.threads import one_thread
-from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
+from fem_needle.trajectory import Trajectory, energy_warnings, summary_of, trajectory_from_samples
 
 Array = NDArray[np.float64]
 Reading = float | Array
@@ -218,7 +218,7 @@ class Simulation:
             | outcome(self.scene, *self._account.closed(self.time, self._inputs))
             | {
                 "error_estimate": None,
-                "warnings": list(self.plant.warnings),
+                "warnings": [*self.plant.warnings, *(energy_warnings(run) if self._engine.has_works else ())],
                 "stop_reason": stop_reason or self._usual_end(),
                 "solve_time": clock.perf_counter() - self._started,
                 "wall_time": clock.perf_counter() - self._started,

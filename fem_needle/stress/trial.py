@@ -13,11 +13,10 @@ from pydantic import ValidationError
 from fem_needle.errors import NeedleError, SuspiciousValueWarning
 from fem_needle.exact import exact_static
 from fem_needle.models import build_plant
-from fem_needle.run_job import ENERGY_BOUND
 from fem_needle.scene import Scene
 from fem_needle.simulation import run_scene, simulate
 from fem_needle.stress.numbers import OTHER, SI, Numbers, Units, scene_of
-from fem_needle.trajectory import VARIABLES, Trajectory
+from fem_needle.trajectory import ENERGY_BOUND, VARIABLES, Trajectory
 
 Array = NDArray[np.float64]
 
