@@ -14,9 +14,10 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from fem_needle.figures.common import MILLIMETERS, SMALL, name_figure, placed
-from fem_needle.figures.scenery import PATH, draw_scenery, lateral_forces, magnification, set_limits, told
+from fem_needle.figures.scenery import PATH, draw_scenery, magnification, set_limits, told
 from fem_needle.figures.tissue import figure_with_tissue
 from fem_needle.pictures import COLORS, INK, new_figure, shared_style
+from fem_needle.run_forces import lateral_forces
 from fem_needle.trajectory import Trajectory
 
 WIDTH, HEIGHT = 8.0, 4.0  # inches
@@ -91,7 +92,8 @@ def _show(lines: list[Line2D], strip: Axes, run: Trajectory, row: int, magnified
     way.set_data(MILLIMETERS * run.depth[: row + 1], MILLIMETERS * run.tip_deflection[: row + 1])
     if hub:
         hub[0].set_data(along[:1], across[:1])
-    for marker, (place, force) in zip(hub[1:], lateral_forces(run, row), strict=True):
+    for marker, (y, force) in zip(hub[1:], lateral_forces(run, row), strict=True):
+        place = MILLIMETERS * y
         acting = [place] if force else []
         marker.set_data(acting, np.interp(acting, along, across))
         marker.set_marker("^" if force > 0.0 else "v")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fem_needle.figures.common import LEAST_RANGE, MILLIMETERS, largest_deflection, limits_of, placed
 from fem_needle.figures.tissue import draw_tissue
 from fem_needle.pictures import COLORS, INK
-from fem_needle.scene import LateralLoad, as_function
+from fem_needle.run_forces import lateral_forces
 from fem_needle.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -74,8 +74,9 @@ def draw_forces(axes: Axes, run: Trajectory, row: int, label: str) -> bool:
     """Draw an arrow, without scale, where a lateral force acts on the needle at a sample; return whether there is one."""
     along, across = placed(run, row)
     drawn = False
-    for place, force in lateral_forces(run, row):
+    for y, force in lateral_forces(run, row):
         if force:
+            place = MILLIMETERS * y
             height = float(np.interp(place, along, across))
             side = -1.0 if force > 0.0 else 1.0
             arrow: dict[str, Any] = {"arrowstyle": "-|>", "color": PATH, "linewidth": 1.8, "shrinkA": 0, "shrinkB": 2}
@@ -83,17 +84,6 @@ def draw_forces(axes: Axes, run: Trajectory, row: int, label: str) -> bool:
             axes.plot([], [], marker=r"$\uparrow$", color=PATH, linestyle="none", markersize=10, label="_" * drawn + label)
             drawn = True
     return drawn
-
-
-def lateral_forces(run: Trajectory, row: int) -> list[tuple[float, float]]:
-    """Return place y [mm] and force [N] of each lateral load at a sample; the command of a loop stands for the first."""
-    commanded = run.signals.get("command_lateral_force")
-    forces: list[tuple[float, float]] = []
-    for load in run.scene.loads:
-        if isinstance(load, LateralLoad):
-            force = float(as_function(load.force).value(float(run.time[row])))
-            forces.append((MILLIMETERS * load.position, force if commanded is None or forces else float(commanded[row])))
-    return forces
 
 
 def magnification(figure: Figure, axes: Axes) -> float:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.errors import SceneError
-from fem_needle.loads import load_case
-from fem_needle.scene import LateralLoad, Scene
+from fem_needle.run_forces import Forces, lateral_forces, support_forces, tip_force
+from fem_needle.scene import Scene
 from fem_needle.tissue_block import layer_extent
 from fem_needle.trajectory import Trajectory
 from fem_needle.view.solids import Surface, arrow, box, plate, together, tube
@@ -150,7 +150,7 @@ class Arrangement:
     def pose(self, row: int) -> Pose:
         """Return what moves, at a sample."""
         line = self._line(row)
-        loads, reactions = _forces(self.run, row)
+        loads, reactions = _loads(self.run, row), support_forces(self.run, row)
         tip = MILLI * float(self.run.tip_deflection[row])
         tip = tip if abs(tip) > INVISIBLE else 0.0
         caption = f"{self.run.time[row]:.4g} s, depth {MILLI * self.run.depth[row]:.4g} mm, tip {tip:.3g} mm"
@@ -194,7 +194,7 @@ def arrangement(run: Trajectory, magnification: float | None = None) -> Arrangem
         raise SceneError(f"--magnification: is no positive number (got {magnification:g})")
     length = run.scene.needle.length
     largest = float(np.nanmax(np.abs(run.station_deflection)))
-    forces = [abs(force) for row in range(len(run.time)) for part in _forces(run, row) for _, force in part]
+    forces = [abs(force) for row in range(len(run.time)) for _, force in (*_loads(run, row), *support_forces(run, row))]
     strongest = max(forces, default=0.0)
     newton = MILLI * SHOWN * length / strongest if strongest else 0.0
     return Arrangement(run, magnification or _rounded(SHOWN * length, largest), newton, _slabs(run))
@@ -228,20 +228,5 @@ def _slabs(run: Trajectory) -> tuple[Slab, ...]:
     return tuple(slabs)
 
 
-def _forces(run: Trajectory, row: int) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
-    """Return the loads and the supports' forces on the needle at a sample: where, y [m], and how large [N]."""
-    scene, time, depth = run.scene, float(run.time[row]), float(run.depth[row])
-    given = load_case(scene, depth, time).forces
-    places = [load.position for load in scene.loads if isinstance(load, LateralLoad)]
-    sizes = [_commanded(run, "lateral_force", row, float(force)) for force in given[: len(places)]]
-    tip = float(given[-1])
-    turned = _commanded(run, "tip_direction", row, 1.0)
-    clamp = depth - scene.needle.length if scene.support.kind == "hub" else 0.0
-    guides = zip((guide.position for guide in scene.support.guides), run.guide_force[row].tolist(), strict=True)
-    return [*zip(places, sizes, strict=True), (depth, tip * turned)], [(clamp, float(run.hub_force[row])), *guides]
-
-
-def _commanded(run: Trajectory, name: str, row: int, given: float) -> float:
-    """Return what a loop has commanded in place of a given value."""
-    values = run.signals.get(f"command_{name}")
-    return float(values[row]) if values is not None and np.isfinite(values[row]) else given
+def _loads(run: Trajectory, row: int) -> Forces:
+    return [*lateral_forces(run, row), tip_force(run, row)]

@@ -79,6 +79,7 @@ RANKS = {
     "expectation": 1,
     "finite_element_model": 13,
     "series_file": 12,
+    "run_forces": 12,
     "vtk_export": 12,
     # whole runs
     "run_job": 13,
@@ -105,6 +106,7 @@ RANKS = {
     "closed_loop": 18,
     "figures": 19,
     "identification": 19,
+    "report": 19.5,
     "cli": 20,
     "__main__": 21,
 }
