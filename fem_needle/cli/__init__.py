@@ -26,6 +26,7 @@ GROUPS = (
     "fem_needle.cli.export",
     "fem_needle.cli.plot",
     "fem_needle.cli.view",
+    "fem_needle.cli.report",
     "fem_needle.cli.converge",
     "fem_needle.cli.analyze",
     "fem_needle.cli.compare",

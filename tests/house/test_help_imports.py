@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-HEAVY = {"scipy", "skfem", "vtk", "vtkmodules", "pyvista", "numba", "xarray", "matplotlib", "numpy", "h5py", "meshio"}
+HEAVY = {"scipy", "skfem", "vtk", "vtkmodules", "pyvista", "numba", "xarray", "matplotlib", "numpy", "h5py", "meshio", "plotly", "jinja2"}
 PROBE = """
 import json, sys
 from fem_needle.cli import main

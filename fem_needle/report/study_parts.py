@@ -1,0 +1,78 @@
+"""What each study adds to its report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import pi
+from typing import Any
+
+from fem_needle.report.numbers import number, ratio
+from fem_needle.report.parts import Chart, Grid
+
+Columns = Mapping[str, Sequence[str]]
+
+MOST_ROWS = 60  # of a table in a page
+
+
+@dataclass(frozen=True, eq=False)
+class StudyParts:
+    """Words, tables and curves of a study.
+
+    Attributes
+    ----------
+    kind
+        What kind of study.
+    paragraphs
+        Topics and sentences.
+    grids, charts
+        Tables of figures; curves.
+    warnings
+        To be seen.
+    picture
+        What its picture shows.
+    other_pictures
+        Further pictures: file and what it shows.
+    alarm
+        What went wrong with the whole, or "".
+    title
+        In place of that of the scene.
+    """
+
+    kind: str
+    paragraphs: tuple[tuple[str, str], ...]
+    grids: tuple[Grid, ...]
+    charts: tuple[Chart, ...]
+    picture: str
+    warnings: tuple[str, ...] = ()
+    other_pictures: Mapping[str, str] = field(default_factory=dict)
+    alarm: str = ""
+    title: str = ""
+
+
+def shortened(caption: str, headers: tuple[str, ...], rows: Sequence[tuple[str, ...]], file: str) -> Grid:
+    """Return a table of the first rows, with a note on what is left out."""
+    left_out = len(rows) - MOST_ROWS
+    note = f"and {left_out} more rows, in {file}" if left_out > 0 else ""
+    return Grid(caption, headers, tuple(rows[:MOST_ROWS]), note)
+
+
+def model_words(description: Mapping[str, Any]) -> str:
+    """Return a model in words: kind, elements or modes, variant and basis."""
+    parts = [str(description.get("model", description.get("label")))]
+    if "elements" in description:
+        degree = f" of degree {description['degree']}" if "degree" in description else ""
+        parts.append(f"{description['elements']} element{'s' * (description['elements'] != 1)}{degree}")
+    if "modes" in description:
+        parts.append(f"{description['modes']} mode{'s' * (description['modes'] != 1)}")
+    return ", ".join([*parts, *(f"{key} {description[key]}" for key in ("variant", "basis") if key in description)])
+
+
+def hertz(value: float | None) -> str:
+    """Return an angular frequency [rad/s] as a number of Hz."""
+    return number(None if value is None else value / (2.0 * pi))
+
+
+def share(value: float | None) -> str:
+    """Return a share; "none" where it is missing or infinite."""
+    return ratio(value)
