@@ -6,7 +6,10 @@ import sys
 
 import pytest
 
-HEAVY = {"scipy", "skfem", "vtk", "vtkmodules", "pyvista", "numba", "xarray", "matplotlib", "numpy", "h5py", "meshio", "plotly", "jinja2"}
+HEAVY = {
+    "scipy", "skfem", "vtk", "vtkmodules", "pyvista", "numba", "xarray", "matplotlib", "numpy", "h5py", "meshio",
+    "plotly", "jinja2",
+}  # fmt: skip
 PROBE = """
 import json, sys
 from fem_needle.cli import main
