@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fem_needle.report.charts import Curve, Panel, panels_figure
-from fem_needle.report.numbers import duration, number
+from fem_needle.report.numbers import duration, instant, number
 from fem_needle.report.parts import Chart, Grid
 from fem_needle.report.study_parts import Columns, StudyParts, shortened
 from fem_needle.scene import Scene
@@ -19,7 +19,7 @@ def benchmark_parts(data: dict[str, Any], columns: Columns, scene: Scene) -> Stu
     cases = " ".join(f"{one['name']}: {one['about']}, against {one['reference']}." for one in data["cases"])
     limits = " ".join(f"{name}: {text}." for name, text in data["limits"].items())
     paragraphs = [
-        ("Study", f"Run time against error, {len(data['rows'])} rows, on {data['date']} at commit {data['commit']}."),
+        ("Study", f"Run time against error, {len(data['rows'])} rows, on {instant(data['date'])}, commit {data['commit']}."),
         ("Cases", cases),
         ("Machine", f"{machine}."),
     ]

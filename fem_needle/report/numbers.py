@@ -104,3 +104,8 @@ def varying(value: Any, unit: str) -> str:
         low, high = (number(extreme / size) for extreme in extremes(value))
         return f"{with_unit(f'{low} to {high}', shown)} over time ({len(value.time)} points)"
     return quantity(value, unit)
+
+
+def instant(text: str) -> str:
+    """Return a date and time of a file as it is read, such as 2026-11-22 21:14:33 UTC."""
+    return text.replace("T", " ").replace("+00:00", " UTC")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from fem_needle.manifest import manifest as manifest_now
-from fem_needle.report.numbers import MISSING, number, quantity, tidy, varying, with_unit
+from fem_needle.report.numbers import MISSING, instant, number, quantity, tidy, varying, with_unit
 from fem_needle.report.parts import Grid, Section
 from fem_needle.report.words import layer_grids, scene_words
 from fem_needle.scene import Scene
@@ -50,7 +50,7 @@ def versions_section(scene: Scene, manifest: dict[str, Any]) -> Section:
     names = list(dict.fromkeys((*(made or {}), *now["versions"])))
     rows = [(name, _text((made or {}).get(name)), _text(now["versions"].get(name))) for name in names]
     rows.append(("platform", _text(manifest.get("platform")), now["platform"]))
-    rows.append(("date", _instant(_text(manifest.get("started"))), _instant(now["started"])))
+    rows.append(("date", instant(_text(manifest.get("started"))), instant(now["started"])))
     grid = Grid("With what it was made", ("", "of the results", "of this report"), tuple(rows))
     wall, seed = manifest.get("wall_time"), manifest.get("seed")
     told = f"Seed of random numbers: {_text(seed)}. " if seed is not None else ""
@@ -67,11 +67,7 @@ def warnings_section(warnings: Iterator[str] | tuple[str, ...] | list[str]) -> S
 def subject(kind: str, manifest: dict[str, Any]) -> str:
     """Return what a report is about and when it was computed."""
     started = manifest.get("started")
-    return f"{kind}, computed {_instant(started)}" if isinstance(started, str) else kind
-
-
-def _instant(text: str) -> str:
-    return text.replace("T", " ").replace("+00:00", " UTC")
+    return f"{kind}, computed {instant(started)}" if isinstance(started, str) else kind
 
 
 def _text(value: Any) -> str:

@@ -51,7 +51,9 @@ class StudyParts:
 
 
 def shortened(caption: str, headers: tuple[str, ...], rows: Sequence[tuple[str, ...]], file: str) -> Grid:
-    """Return a table of the first rows, with a note on what is left out."""
+    """Return a table of the first rows without empty columns, with a note on what is left out."""
+    kept = [index for index in range(len(headers)) if not rows or any(row[index] for row in rows)]
+    headers, rows = tuple(headers[index] for index in kept), [tuple(row[index] for index in kept) for row in rows]
     left_out = len(rows) - MOST_ROWS
     note = f"and {left_out} more rows, in {file}" if left_out > 0 else ""
     return Grid(caption, headers, tuple(rows[:MOST_ROWS]), note)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fem_needle import load_scene
-from fem_needle.report.numbers import duration, millimeters, modulus, number, quantity, ratio, tidy, varying, with_unit
+from fem_needle.report.numbers import duration, instant, millimeters, modulus, number, quantity, ratio, tidy, varying, with_unit
 from fem_needle.report.shared import values_section
 from fem_needle.report.words import layer_grids, scene_words
 from fem_needle.scene import (
@@ -66,6 +66,10 @@ def test_quantities_are_in_mm_n_s_and_degrees():
 def test_values_that_vary():
     assert plain(varying(Sinusoid(mean=0.1, amplitude=0.05, frequency=30.0), "N")) == "0.1 ± 0.05 N at 30 Hz"
     assert plain(varying(Table(time=[0.0, 1.0, 2.0], value=[0.0, 0.03, 0.01]), "m")) == "0 to 30 mm over time (3 points)"
+
+
+def test_dates():
+    assert instant("2026-11-22T21:14:33+00:00") == "2026-11-22 21:14:33 UTC"
 
 
 def test_powers_in_sentences():
