@@ -78,7 +78,7 @@ def test_findings_follow_from_the_runs():
     assert ["does not hold" in turned[number] for number in (1, 3)] == [True, True]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_page_is_current():
     """Minutes: every number of docs/steering.md."""
     assert page(sections()) == PAGE.read_text(encoding="utf-8")
