@@ -229,6 +229,13 @@ def test_the_command_writes_a_page_and_replaces_it_by_force_alone(folder, tmp_pa
     assert command_line("report", folder, "--out", path, "--force")[0] == 0
 
 
+def test_a_report_goes_with_its_run(run, tmp_path):
+    folder = save_run(run, tmp_path / "run", vtk=False)
+    (folder / "report.html").touch()
+    save_run(run, folder, force=True, vtk=False)
+    assert not (folder / "report.html").exists()
+
+
 def test_what_is_no_run_is_refused(tmp_path, command_line):
     status, _, err = command_line("report", tmp_path)
     assert status == 2 and f"{tmp_path}: is no run folder and no study" in err and list(tmp_path.iterdir()) == []
