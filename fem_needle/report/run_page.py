@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ def run_page(run: Trajectory, manifest: dict[str, Any], folder: Path) -> Page:
     sections = (
         _summary_section(run),
         warnings_section(_list(summary, "warnings")),
-        scene_section(scene),
+        _scene_section(run),
         _method_section(run),
         _results_section(run, folder),
         _ledger_section(run),
@@ -71,6 +72,15 @@ def broken_page(scene: Scene, summary: dict[str, Any], manifest: dict[str, Any])
         versions_section(scene, manifest),
     )
     return Page(scene.title or UNTITLED, subject("Run", manifest), alarm, sections)
+
+
+def _scene_section(run: Trajectory) -> Section:
+    """Return the scene in words; of a loop that was left open, that it was."""
+    section = scene_section(run.scene)
+    if run.scene.controller.kind == "none" or "controller" in run.summary:
+        return section
+    told = ("Open loop", "The scene's controller did not act in this run.")
+    return replace(section, paragraphs=(*section.paragraphs, told))
 
 
 def _list(summary: dict[str, Any], name: str) -> list[Any]:
@@ -108,7 +118,8 @@ def _summary_rows(run: Trajectory) -> Iterator[tuple[str, str]]:
 
 def _target_rows(summary: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "error of the tip at the target", millimeters(summary["target_error"])
-    yield "target reached", number(summary.get("target_reached"))
+    missed = "no: the error is that where the run ended"
+    yield "target reached", missed if summary.get("target_reached") is False else number(summary.get("target_reached"))
     for name, value in (summary.get("largest_command") or {}).items():
         yield f"largest command, {name.replace('_', ' ')}", quantity(value, INPUT_UNITS.get(name, "1"))
     for name, value in (summary.get("effort") or {}).items():
@@ -128,7 +139,7 @@ def _method_section(run: Trajectory) -> Section:
     told += f" The tip was to be exact to {ratio(numerics.tolerance)} of its largest deflection."
     section = Section("method", "How it was computed", paragraphs=(("Model", told), *_inertia(summary)))
     skipped = _skipped_sections(summary)
-    return section if not skipped else Section(section.name, section.title, section.paragraphs, grids=skipped[0].grids)
+    return replace(section, grids=skipped[0].grids) if skipped else section
 
 
 def _model(summary: dict[str, Any]) -> str:

@@ -170,9 +170,11 @@ def _control(scene: Scene) -> Iterator[str]:
         return
     depth = "" if target.depth is None else f" at a depth of {millimeters(target.depth)}"
     yield f"The scene wants the tip {millimeters(target.lateral)} off the axis{depth}."
-    if controller.kind != "none":
-        command = controller.input.replace("_", " ")
-        yield f"Controller: {described(controller)}; it commands the {command} every {quantity(controller.period, 's')}."
+    if controller.variant == "fully-actuated":
+        yield f"Controller: {described(controller)}; it acts on the depth and on every coordinate of the needle."
+    elif controller.kind != "none":
+        command, period = controller.input.replace("_", " "), quantity(controller.period, "s")
+        yield f"Controller: {described(controller)}; it commands the {command} every {period}."
     for sensor in scene.sensors:
         late = f", {quantity(sensor.delay, 's')} late" if sensor.delay else ""
         unit = next((unit for unit, _ in sensor.readings.values()), "1")

@@ -213,6 +213,17 @@ def test_a_run_without_results_has_a_report(folder, tmp_path, summary):
     assert "200\u00a0mm long" in html and "Plotly" not in html and ("too stiff" in html) == (summary is not None)
 
 
+@pytest.mark.usefixtures("undrawn")
+def test_a_scene_with_a_controller_that_did_not_act_says_so(run, folder):
+    finger = {"kind": "lateral", "position": -0.01, "force": 0.0}
+    loop = {"loads": [finger], "sensors": [{"kind": "tip-imaging"}], "controller": {"kind": "pid"}}
+    scene = run.scene.with_values(loop)
+    told = dict(section(of(replace(run, scene=scene), folder), "scene").paragraphs)
+    assert told["Open loop"] == "The scene's controller did not act in this run." and "pid" in told["Control"]
+    closed = replace(run, scene=scene, summary=run.summary | {"controller": {"kind": "pid"}})
+    assert "Open loop" not in dict(section(of(closed, folder), "scene").paragraphs)
+
+
 def test_long_curves_are_thinned_and_keep_their_ends():
     chosen = thinned(100_000)
     assert (len(chosen), chosen[0], chosen[-1]) == (2000, 0, 99_999)

@@ -134,6 +134,8 @@ def test_a_loop_in_words():
     told = plain(dict(scene_words(load_scene("steering")))["Control"])
     assert told.startswith("The scene wants the tip 0 mm off the axis at a depth of 100 mm. Controller: incremental; it commands")
     assert "Sensor tip-imaging: a reading every 0.15 s, with noise of 0.1 mm." in told
+    actuated = dict(scene_words(load_scene("thesis-inverse-dynamics")))["Control"]
+    assert "inverse-dynamics, fully-actuated; it acts on the depth and on every coordinate of the needle." in actuated
 
 
 def test_columns_of_layers_without_a_value_are_left_out():
