@@ -58,6 +58,13 @@ def png_bytes(figure: Figure) -> bytes:
 def picture_bytes(figure: Figure, kind: str = "png") -> bytes:
     """Return a figure as one of `FORMATS`, the same bytes for the same figure.
 
+    Parameters
+    ----------
+    figure
+        Of matplotlib.
+    kind
+        ``"png"``, ``"svg"`` or ``"pdf"``.
+
     Raises
     ------
     ValueError

@@ -93,6 +93,13 @@ def save_scene(scene: Scene, path: str | Path) -> None:
     """Write a scene as TOML; a file of that name is replaced.
 
     Loading it gives an equal scene.
+
+    Parameters
+    ----------
+    scene
+        Any scene.
+    path
+        Of the file, usually ``.toml``.
     """
     Path(path).write_bytes(scene_text(scene).encode("utf-8"))
 

@@ -60,7 +60,7 @@ def run_scene(
     time_step
         Largest step [s]; default: chosen from the tolerance.
     tolerance
-        Largest tip error over the run / largest |tip deflection|.
+        Largest tip error over the run / largest magnitude of the tip deflection.
     analysis
         "auto", "dynamic", "quasi-static" or "static".
     output_step
@@ -114,7 +114,21 @@ def simulate(
     tolerance: float | None = None,
     observer: Observer | None = None,
 ) -> Trajectory:
-    """Run a plant through its scene; arguments and errors as in `run_scene`."""
+    """Run a plant through its scene; arguments and errors as in `run_scene`.
+
+    Parameters
+    ----------
+    plant
+        Of any model; its scene says what happens.
+    time_step, output_step
+        [s].
+    analysis
+        ``"dynamic"``, ``"quasi-static"`` or ``"static"``.
+    tolerance
+        Largest tip error over the run / largest magnitude of the tip deflection.
+    observer
+        Is told the samples while they are computed.
+    """
     values = {
         "numerics.time_step": time_step,
         "numerics.analysis": analysis,

@@ -116,7 +116,17 @@ class LineModes:
 
 
 def mode_basis(needle: FiniteElementNeedle, modes: int, basis: str = "full-length") -> Basis:
-    """Return the clamped-free modes that `AssumedModeNeedle` takes, on the elements of a needle."""
+    """Return the clamped-free modes that `AssumedModeNeedle` takes, on the elements of a needle.
+
+    Parameters
+    ----------
+    needle
+        The elements that the modes are put on.
+    modes
+        How many.
+    basis
+        Modes of the ``"full-length"`` or of the ``"inserted-length"``.
+    """
     if basis not in {"full-length", "inserted-length"}:
         raise SceneError(f"basis: got {basis!r}; allowed 'full-length', 'inserted-length'")
     if needle.is_entry and basis == "full-length":
@@ -125,7 +135,19 @@ def mode_basis(needle: FiniteElementNeedle, modes: int, basis: str = "full-lengt
 
 
 def natural_mode_basis(needle: FiniteElementNeedle, modes: int, depth: float, time: float = 0.0) -> FixedBasis:
-    """Return the lowest natural modes of the needle in its tissue, held at a depth [m], guides left out."""
+    """Return the lowest natural modes of the needle in its tissue, held at a depth [m], guides left out.
+
+    Parameters
+    ----------
+    needle
+        The elements that the modes are put on.
+    modes
+        How many.
+    depth
+        [m].
+    time
+        Of the stiffness factor [s].
+    """
     operators, clamped = needle.operators(depth, time), needle.prescribed
     stiffness, mass = (
         banded.to_dense(banded.trailing(band, clamped)) for band in (operators.stiffness, operators.mass)
@@ -136,6 +158,17 @@ def natural_mode_basis(needle: FiniteElementNeedle, modes: int, depth: float, ti
 
 def snapshot_basis(needle: FiniteElementNeedle, run: Trajectory, modes: int, depth: float) -> FixedBasis:
     """Return the proper orthogonal modes of a run: they catch the most bending energy (at one depth) of its shapes.
+
+    Parameters
+    ----------
+    needle
+        The elements that the modes are put on.
+    run
+        A run of this needle.
+    modes
+        How many.
+    depth
+        Whose bending stiffness weighs the shapes [m].
 
     Raises
     ------

@@ -88,7 +88,7 @@ def _clamped_tip_factor(x: float) -> float:
 class InfiniteBeam:
     """Infinite beam on a foundation under a point force at x = 0.
 
-    w(x) = (P lambda / 2k) exp(-lambda |x|) (cos lambda x + sin lambda |x|).
+    w(x) = (P lambda / 2k) exp(-lambda abs(x)) (cos lambda x + sin lambda abs(x)).
 
     Parameters
     ----------

@@ -81,7 +81,17 @@ def friction_run(scene: Scene) -> Measurements:
 
 
 def with_noise(measured: Measurements, deviations: Mapping[str, float], random: np.random.Generator) -> Measurements:
-    """Return measurements with normally distributed noise of given standard deviations [SI] on some columns."""
+    """Return measurements with normally distributed noise of given standard deviations [SI] on some columns.
+
+    Parameters
+    ----------
+    measured
+        Without noise, or with other noise.
+    deviations
+        Standard deviation by column, in its SI unit.
+    random
+        Where the numbers come from.
+    """
     noisy = {name: measured[name] + size * random.standard_normal(measured.size) for name, size in deviations.items()}
     return Measurements({**measured.columns, **noisy}, measured.source)
 

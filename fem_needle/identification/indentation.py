@@ -76,6 +76,15 @@ def beam_point_stiffness(
 ) -> float:
     """Return F/w [N/m] where a force acts at the free end or the middle of a long beam on a foundation.
 
+    Parameters
+    ----------
+    foundation_modulus
+        k [N/m^2].
+    bending_stiffness
+        EI [N m^2] of the needle.
+    place
+        ``"end"``: the force acts at the free end; ``"middle"``: far from both ends.
+
     Raises
     ------
     SceneError
@@ -88,6 +97,15 @@ def beam_point_stiffness(
 def beam_modulus_of_point(stiffness: float, bending_stiffness: float, place: Literal["end", "middle"] = "end") -> float:
     """Return the foundation modulus [N/m^2] from F/w [N/m] measured with the needle itself: `beam_point_stiffness` inverted.
 
+    Parameters
+    ----------
+    stiffness
+        F/w [N/m].
+    bending_stiffness
+        EI [N m^2] of the needle.
+    place
+        ``"end"``: the force acts at the free end; ``"middle"``: far from both ends.
+
     Raises
     ------
     SceneError
@@ -99,6 +117,13 @@ def beam_modulus_of_point(stiffness: float, bending_stiffness: float, place: Lit
 
 def rod_modulus_of_point(stiffness: float, inserted_length: float) -> float:
     """Return the foundation modulus k = (F/w) / z [N/m^2] from a rigid rod that is moved sideways as a whole.
+
+    Parameters
+    ----------
+    stiffness
+        F/w [N/m].
+    inserted_length
+        z [m].
 
     Raises
     ------

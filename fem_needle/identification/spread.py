@@ -38,6 +38,11 @@ class Spread:
 def spread(values: ArrayLike) -> Spread:
     """Return mean and standard deviation of repetitions (n,).
 
+    Parameters
+    ----------
+    values
+        (n,), in any unit; at least two.
+
     Raises
     ------
     SceneError

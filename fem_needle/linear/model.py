@@ -106,12 +106,12 @@ class LinearModel:
 
     @property
     def natural_frequencies(self) -> Array:
-        """|pole| of every pair that vibrates, rising [rad/s]; overdamped motions are among the `poles`."""
+        """Magnitude of the pole of every pair that vibrates, rising [rad/s]; overdamped motions are among the `poles`."""
         return np.asarray(np.abs(self._vibrations))
 
     @property
     def damping_ratios(self) -> Array:
-        """-Re(pole) / |pole| of the same."""
+        """-Re(pole) by its magnitude, of the same."""
         return np.asarray(-self._vibrations.real / np.abs(self._vibrations))
 
     def transfer_function(self, output: str, input: str, frequencies: ArrayLike) -> ComplexArray:

@@ -21,7 +21,13 @@ TEMPLATE, STYLE, SCRIPT = "page.html", "page.css", "page.js"
 
 
 def html_page(page: Page) -> str:
-    """Return a report as HTML."""
+    """Return a report as HTML.
+
+    Parameters
+    ----------
+    page
+        Of `read_folder`.
+    """
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(source=_source, chart_data=_chart_data)
     charts = any(section.charts for section in page.sections)
@@ -37,6 +43,13 @@ def html_page(page: Page) -> str:
 
 def write_report(page: Page, path: Path) -> None:
     """Write a report; its folder is created where it is missing.
+
+    Parameters
+    ----------
+    page
+        Of `read_folder`.
+    path
+        An HTML file; one of that name is replaced.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("fem_needle", "reduced_model")
-IGNORED = {"runs", "dist", "build", "__pycache__", ".git", ".venv", ".hypothesis", "mutants"}
+IGNORED = {"runs", "dist", "build", "site", "__pycache__", ".git", ".venv", ".hypothesis", "mutants"}
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 

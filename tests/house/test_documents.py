@@ -1,9 +1,6 @@
-"""The documents are true: their commands and examples run, their links lead somewhere, the contract names everything."""
+"""The documents are true: their links lead somewhere, the contract names everything; that their code runs: tests/docs."""
 
 import re
-import shlex
-import subprocess
-import sys
 from itertools import chain
 
 import pytest
@@ -29,13 +26,6 @@ def blocks(text, language):
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
 
 
-def command_lines():
-    """Every `fem-needle ...` line of the README, without the set-up before it."""
-    lines = chain.from_iterable(block.splitlines() for block in blocks(README, "sh"))
-    found = (re.search(r"fem-needle (.*)$", line) for line in lines)
-    return [match.group(1).partition(" #")[0].strip() for match in found if match]
-
-
 def test_the_readme_has_the_two_commands():
     lines = list(chain.from_iterable(block.splitlines() for block in blocks(README, "sh")))
     assert RUN_COMMAND in lines
@@ -48,27 +38,9 @@ def test_the_build_script_begins_with_the_test_command():
     assert commands[0] == TEST_COMMAND
 
 
-@pytest.mark.parametrize("line", command_lines())
-def test_commands_of_the_readme_run(line, tmp_path):
-    command = [sys.executable, "-m", "fem_needle", *shlex.split(line)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
-    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
-    assert done.stdout
-
-
-@pytest.mark.parametrize("example", blocks(README, "python"), ids=["one run", "many runs"])
-def test_the_examples_of_the_readme_run(example, tmp_path, monkeypatch, capsys):
-    assert len(example.splitlines()) <= 15
-    monkeypatch.chdir(tmp_path)
-    exec(compile(example, "README.md", "exec"), {})
-    assert "mm" in capsys.readouterr().out
-    assert (tmp_path / "my-run" / "series.nc").exists() == ("my-run" in example)
-
-
-def test_the_example_of_the_page_on_control_runs(capsys):
-    [example] = blocks((ROOT / "docs" / "control.md").read_text(encoding="utf-8"), "python")
-    exec(compile(example, "control.md", "exec"), {})
-    assert "mm with" in capsys.readouterr().out
+def test_the_examples_of_the_readme_are_short():
+    """That they run: tests/docs."""
+    assert {len(example.splitlines()) <= 15 for example in blocks(README, "python")} == {True}
 
 
 def test_the_readme_lists_every_shipped_scene():
