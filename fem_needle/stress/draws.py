@@ -17,7 +17,7 @@ def random_numbers(seed: int) -> Numbers:
     random = np.random.default_rng(seed)
     length, hub = _spread(random, 1e-3, 10.0), bool(random.random() < 0.5)
     mass, layers = _spread(random, 1e-4, 1.0), _layers(random, length)
-    steps, time_step = int(random.integers(2, 30)), _spread(random, 1e-7, 10.0)
+    steps, time_step = int(random.integers(2, 14)), _spread(random, 1e-7, 10.0)
     depth = _depth(random, length, layers)
     times, depths = _course(random, length, depth, steps, time_step)
     bends = hub or depths[0] > 1e-5 * length  # a shape cannot be given to what is not inserted
@@ -42,9 +42,9 @@ def random_numbers(seed: int) -> Numbers:
         tip_deflection=1e-3 * length,
         time_step=time_step,
         steps=steps,
-        outputs=min(steps, 8),
+        outputs=min(steps, 4),
         analysis=ANALYSES[int(random.choice(4, p=[0.2, 0.2, 0.5, 0.1]))],
-        elements=int(_spread(random, 1.0, 64.0)),
+        elements=int(_spread(random, 1.0, 24.0)),
     )
 
 

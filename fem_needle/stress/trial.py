@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from fem_needle.errors import NeedleError, SuspiciousValueWarning
 from fem_needle.exact import exact_static
+from fem_needle.exact.statics import tip_force
 from fem_needle.models import build_plant
 from fem_needle.scene import Scene
 from fem_needle.simulation import run_scene, simulate
@@ -93,11 +94,17 @@ class Trial:
         return self.crash or ", ".join(f"{figure.name} {figure.value:.2g} > {figure.bound:g}" for figure in failed)
 
 
-def examine(name: str, numbers: Numbers, modes: int | None) -> Trial:
-    """Put a scene through all checks, by finite elements or by so many assumed modes."""
+def examine(name: str, numbers: Numbers, modes: int | None, *, brief: bool = False) -> Trial:
+    """Put a scene through all checks, by finite elements or by so many assumed modes.
+
+    In brief: mirrored and in other units at once, and no automatic mesh beside the exact solution.
+    """
     try:
         run = _run(numbers, modes)
-        figures = [*_of_run(run), *_changed(numbers, modes, run), *_equilibrium(numbers, modes)]
+        changed = _changed_at_once if brief else _changed
+        figures = [*_of_run(run), *changed(numbers, modes, run), *_equilibrium(numbers, modes)]
+        if not brief:
+            figures += _automatic(numbers, modes)
     except (NeedleError, ValidationError) as error:
         return Trial(name, announced=str(error)) if str(error) else Trial(name, crash="no message")
     except Exception as error:
@@ -142,26 +149,39 @@ def _changed(numbers: Numbers, modes: int | None, run: Trajectory) -> Iterator[F
         yield Figure("way back", _apart(tip[::-1], tip), same)
 
 
+def _changed_at_once(numbers: Numbers, modes: int | None, run: Trajectory) -> Iterator[Figure]:
+    """Run the scene turned round and in other units."""
+    same = SAME if (modes or 0) <= FEW_MODES else DEPENDENT
+    changed = _run(numbers, modes, OTHER, mirrored=True).tip_deflection
+    yield Figure("mirror and units", _apart(-changed / OTHER.length, run.tip_deflection), same)
+
+
 def _equilibrium(numbers: Numbers, modes: int | None) -> Iterator[Figure]:
-    """Compare the first equilibrium with the exact one, and add up its forces."""
-    rest = replace(numbers, times=(0.0,), depths=numbers.depths[:1], analysis="static", steps=1, outputs=1)
-    scene = scene_of(rest)
+    """Add up the forces of the first equilibrium."""
+    rest = _at_rest(numbers)
     run = _run(rest, modes)
-    applied = sum(force for _, force in rest.lateral) + exact_static(scene, rest.depths[0]).tip_force
+    applied = sum(force for _, force in rest.lateral) + tip_force(scene_of(rest), rest.depths[0], 0.0)
     forces = [float(run.hub_force[0]), float(run.tissue_force[0]), *run.guide_force[0].tolist(), applied]
     largest = max(abs(force) for force in forces)
     yield Figure("force sum", abs(sum(forces)) / largest if largest > TINY else 0.0, FORCE_SUM)
-    if modes is None and (numbers.support == "hub" or rest.depths[0] > INSERTED * rest.length):
-        yield from _automatic(scene, rest.depths[0])
 
 
-def _automatic(scene: Scene, depth: float) -> Iterator[Figure]:
+def _automatic(numbers: Numbers, modes: int | None) -> Iterator[Figure]:
     """Compare the tip of an automatic mesh with the exact one, unless it says that it missed the tolerance."""
+    rest = _at_rest(numbers)
+    depth = rest.depths[0]
+    if modes is not None or (rest.support == "entry" and depth <= INSERTED * rest.length):
+        return
+    scene = scene_of(rest)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SuspiciousValueWarning)
         run = run_scene(scene.with_value("numerics.elements", "auto"))
     if not any("tolerance" in message for message in run.summary["warnings"]):
         yield Figure("exact", _apart(run.tip_deflection[:1], np.array([exact_static(scene, depth).tip_deflection])), EXACT)
+
+
+def _at_rest(numbers: Numbers) -> Numbers:
+    return replace(numbers, times=(0.0,), depths=numbers.depths[:1], analysis="static", steps=1, outputs=1)
 
 
 def _apart(values: Array, others: Array) -> float:
