@@ -94,3 +94,12 @@ def test_the_site_needs_no_network(site):
     loaded = re.compile(r'<(?:script|img|iframe)[^>]*src="https?:|<link[^>]*stylesheet[^>]*href="https?:|@import url\(.?https?:')
     assert [page.name for page in site.rglob("*.html") if loaded.search(page.read_text(encoding="utf-8"))] == []
     assert all((site / page).is_file() for page in ("index.html", "tutorial.html", "api/runs.html", "how-to/my-needle.html"))
+
+
+@pytest.mark.slow
+def test_units_and_shapes_are_on_the_pages(site):
+    """They come from the docstrings, whose first colon napoleon would take for a type."""
+    text = re.sub(r"<[^>]+>", "", "".join(path.read_text(encoding="utf-8") for path in sorted((site / "api").glob("*.html"))))
+    for shown in ("Largest step [s]", "Duration of the run [s]: as given", "(nt, n)", "[N/m^2], lateral force per length"):
+        assert shown in text
+    assert "Type:\n" not in text
