@@ -4,8 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from fem_needle import ComputationError
+from fem_needle.cli import build_application
 from fem_needle.closed_loop.simulation import UnstableLoopError
 from reduced_model.steering import closed_loops, comparison, page, table_iv
 from reduced_model.thesis_data import TABLE_IV
@@ -134,7 +136,7 @@ def test_controllers_compared(monkeypatch):
     assert [[np.min(curve.values) for curve in panel.curves] for panel in drawn.panels] == [[-1.0, -1.0], [-3.0, -3.0]]
 
 
-def test_sections_below_one_another(monkeypatch, tmp_path):
+def test_the_command_writes_sections_below_one_another(monkeypatch, tmp_path):
     first, second = Section("1 a", "x", pictures={"a.png": lambda: b"drawn"}), Section("2 b", "y")
     monkeypatch.setattr(page, "SECTIONS", {"a": lambda: first, "b": lambda: second})
     file = tmp_path / "steering.md"
@@ -142,3 +144,8 @@ def test_sections_below_one_another(monkeypatch, tmp_path):
     assert written == (file, tmp_path / "pictures" / "a.png")
     assert file.read_text(encoding="utf-8").endswith("## 1 a\n\nx\n\n## 2 b\n\ny\n")
     assert written[1].read_bytes() == b"drawn"
+    runner, application = CliRunner(), build_application()
+    assert runner.invoke(application, ["experiments"]).output == file.read_text(encoding="utf-8")
+    told = runner.invoke(application, ["experiments", "--out", str(tmp_path / "new" / "page.md")])
+    assert told.output.count("wrote ") == 2
+    assert (tmp_path / "new" / "page.md").read_bytes() == file.read_bytes()

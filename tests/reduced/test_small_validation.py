@@ -5,10 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fem_needle.exact import exact_static
 from fem_needle.identification import spread
+from fem_needle.statics import solve_static
 from reduced_model.identification import friction
 from reduced_model.thesis_data import TABLE_I
-from reduced_model.validation import energy, insertion, pictures, released, transients
+from reduced_model.validation import energy, insertion, pictures, released, signs, transients, tube_at_rest
 from reduced_model.validation.cases import CORRECTED, TWO, TWO_INSERTED
 from tests.house.source import ROOT
 from tests.reduced.small_pages import Drawn, remember_apart, tables
@@ -167,3 +169,34 @@ def test_friction_in_words(monkeypatch):
     assert "errs by 3.6 mN and 0.021 N s/m (root mean square)" in text
     assert "standard errors are 2.0 mN and 0.010 N s/m, and the 95 % intervals hold the truth in 1 and 1 of 2" in text
     assert "is 20 mN below mu_s" in text
+
+
+def test_sign_changes_drawn(monkeypatch):
+    """Branches are drawn apart, the exact one is shaded where the tip moves against the force."""
+    monkeypatch.setattr(signs, "PICTURE_MODULI", np.array([1e3, 5e4]))
+    depths = {1e3: {"exact": (0.19,)}, 5e4: {"exact": (0.03, 0.13)}}
+    monkeypatch.setattr(
+        signs, "sign_changes", lambda modulus, labels: signs.SignChanges(modulus, dict.fromkeys(labels, ()) | depths[modulus])
+    )
+    drawn = Drawn(monkeypatch, signs)
+    signs._picture()
+    exact, *others = drawn.panels[0].curves
+    np.testing.assert_array_equal(exact.across, [1.0, 50.0, np.nan, 50.0, np.nan])  # kN/m^2
+    np.testing.assert_allclose(exact.values, [190.0, 30.0, np.nan, 130.0, np.nan])  # mm
+    assert all(np.all(np.isnan(curve.values)) for curve in others)
+    (shaded,) = drawn.axes.collections
+    assert {tuple(point) for point in shaded.get_paths()[0].vertices} >= {(1.0, 190.0), (1.0, 196.0), (50.0, 30.0), (50.0, 130.0)}
+
+
+def test_errors_at_rest_drawn(monkeypatch):
+    monkeypatch.setattr(tube_at_rest, "PICTURE_MODULI", (5e4,))
+    monkeypatch.setattr(tube_at_rest, "CURVE_POINTS", 3)
+    drawn = Drawn(monkeypatch, pictures)
+    tube_at_rest._picture()
+    assert [panel.title for panel in drawn.panels][-1] == "clamped at the hub, force at the skin"
+    (curve,) = drawn.panels[0].curves
+    ends = np.array([tube_at_rest.SHALLOW, tube_at_rest.HUB_REACH])
+    np.testing.assert_allclose(curve.across[[0, -1]], (5e4 / (4 * tube_at_rest.TUBE.bending_stiffness)) ** 0.25 * ends)
+    scene = tube_at_rest._scene(next(iter(tube_at_rest.LOADS)), 5e4)
+    error = solve_static(TWO.plant(scene), depth=ends[1]).tip_deflection / exact_static(scene, ends[1]).tip_deflection - 1.0
+    assert curve.values[-1] == pytest.approx(100.0 * abs(error), rel=1e-6)
