@@ -18,7 +18,8 @@ EXPORTS = ("series.csv", "deflection.csv", "series.mat", "deflection.vtkhdf")
 PICTURES = {"shapes": "shapes", "tip-path": "tip_path", "courses": "courses", "energies": "energies", "waterfall": "waterfall"}
 ANIMATION = "animation.gif"
 _DRAWN = (*(f"{name}.{ending}" for name in PICTURES.values() for ending in ("png", "svg", "pdf")), ANIMATION)
-FILES = ("summary.json", "series.nc", "steer.png", "report.html", "deflection.pvd", *EXPORTS, *_DRAWN, "scene.toml", "manifest.json")
+_PAGES = ("steer.png", "report.html")
+FILES = ("summary.json", "series.nc", *_PAGES, "deflection.pvd", *EXPORTS, *_DRAWN, "scene.toml", "manifest.json")
 STUDIES = ("converge.json", "compare.json", "analyze.json", "benchmark.json", "steer.json", "identify.json")
 FRAMES = (("needle", "*.vtp"), ("tissue", "*.vtu"))
 
