@@ -1,11 +1,23 @@
 """Messages about wrong input that no other test meets: what is said names the value and what is allowed."""
 
+import meshio
 import numpy as np
 import pytest
 
-from fem_needle import FiniteElementNeedle, SceneError, Simulation, load_scene, parse_scene, simulate, simulate_many, steer
+from fem_needle import (
+    FiniteElementNeedle,
+    SceneError,
+    Simulation,
+    load_scene,
+    mesh_reader,
+    parse_scene,
+    simulate,
+    simulate_many,
+    steer,
+)
 from fem_needle.closed_loop.repeating import repeat
 from fem_needle.errors import SuspiciousValueWarning
+from fem_needle.figures import shapes
 from fem_needle.identification.fit import identify
 from fem_needle.identification.least_squares import weighted_least_squares
 from fem_needle.identification.measurements import Measurements
@@ -13,6 +25,7 @@ from fem_needle.identification.stiffness import identify_stiffness
 from fem_needle.mesh_file import checked_positions
 from fem_needle.scene import Insertion, TipLoad
 from fem_needle.scene.table_file import read_text
+from fem_needle.scene_file import MOST_KEYS
 from reduced_model import mode_basis
 from tests.consistency.scenes import GEL, held, moving, scene_of
 
@@ -84,6 +97,14 @@ CASES = {
     "positions that are words": (lambda: checked_positions(["a", "b"]), "is not a list of numbers"),
     "positions that are not finite": (lambda: checked_positions([0.0, np.nan, 0.2]), "holds a position that is not finite"),
     "an empty scene": (lambda: parse_scene(" \n"), "scene: is empty"),
+    "shapes at no depth": (
+        lambda: shapes(simulate(FiniteElementNeedle(STILL, elements=2), time_step=1e-3), []),
+        "depths: got none; allowed one or more, m",
+    ),
+    "a scene of too many tables": (
+        lambda: parse_scene("[[a]]\n" * (MOST_KEYS // 2 + 1)),
+        rf"scene: has {2 * (MOST_KEYS // 2 + 1)} tables and lists \(allowed up to {MOST_KEYS}\)",
+    ),
     "a basis of no name": (
         lambda: mode_basis(FiniteElementNeedle(STILL, elements=2), 2, "half-length"),
         "basis: got 'half-length'; allowed 'full-length', 'inserted-length'",
@@ -124,3 +145,11 @@ def test_a_loop_passes_on_what_its_model_warns_of():
     )
     with pytest.warns(SuspiciousValueWarning, match="lose their digits"):
         steer(scene)
+
+
+def test_a_mesh_of_too_many_points(tmp_path, monkeypatch):
+    monkeypatch.setattr(mesh_reader, "MOST_POINTS", 2)
+    path = tmp_path / "three.vtu"
+    meshio.Mesh(np.eye(3), [("line", [[0, 1], [1, 2]])]).write(path)
+    with pytest.raises(ValueError, match=r"it holds 3 points \(allowed up to 2\)"):
+        mesh_reader.contents(path)
