@@ -22,6 +22,7 @@ BETWEEN = 1.25  # the largest difference at rest over the largest at the instant
 MESH_INSTANTS = 12
 VIBRATING = 4.0 / 3.0  # the error of a free vibration over the difference from twice as many elements: its order is 2 or more
 PILOT_ELEMENTS = 8
+LONGEST_ELEMENT = 4.0  # decay lengths (4 EI / k)^(1/4): meshes of longer ones may agree with each other and be wrong
 GROWN = 2.0  # an error that two finer meshes make larger by this factor is round-off
 
 
@@ -98,19 +99,27 @@ class Meshes:
 
     def fewest(self, allowed: float) -> int:
         """Return the fewest elements whose error is allowed; where none is, those with the smallest error."""
+        resolving = [count for count in ELEMENT_CHOICES if self.decay_lengths(count) <= LONGEST_ELEMENT] or [ELEMENT_CHOICES[-1]]
         errors = []
-        for count in ELEMENT_CHOICES:
+        for count in resolving:
             errors.append(self.error(count))
             if errors[-1] <= allowed:
                 return count
             if len(errors) > 2 and min(errors[-2:]) > GROWN * min(errors):  # round-off grows with the elements
                 break
-        return ELEMENT_CHOICES[int(np.argmin(errors))]
+        return resolving[int(np.argmin(errors))]
 
     def chosen(self) -> ChosenPlant:
         """Return the needle with the fewest elements that the tips at rest allow."""
         share = ONLY_SHARE if self._needs_no_steps else ELEMENT_SHARE
         return self.choice(self.needle(self.fewest(share * self.scene.numerics.tolerance)), 0.0)
+
+    def decay_lengths(self, count: int) -> float:
+        """Return the length of one of so many elements over the shortest decay length of the layers that the tip reaches."""
+        scene, (_, deepest) = self.scene, self.scene.insertion.depth_range(self.scene.duration)
+        reached = [layer.foundation_modulus for layer in scene.tissue.layers if layer.start < deepest]
+        span = deepest if scene.support.kind == "entry" else scene.needle.length
+        return span / count * (max(reached, default=0.0) / (4.0 * scene.needle.bending_stiffness)) ** 0.25
 
     def finer(self, plant: Plant, factor: float) -> FiniteElementNeedle | None:
         """Return the needle with ``factor`` times the elements of a plant and more than it has; None beyond the finest."""
@@ -123,7 +132,12 @@ class Meshes:
         count, tolerance = int(plant.describe()["elements"]), self.scene.numerics.tolerance
         error = max(error, self.error(count))
         missed = f"the tolerance {tolerance:g} was not reached with {count} elements: see error_estimate"
-        warnings = (missed,) if error > tolerance else ()
+        lengths = self.decay_lengths(count)
+        coarse = (
+            f"each of {count} elements is {lengths:.2g} decay lengths (4 EI / k)^(1/4) long > {LONGEST_ELEMENT:g}: the tolerance "
+            "may be missed without a sign of it; give more elements, or a mesh that is fine where forces act"
+        )
+        warnings = (*((missed,) if error > tolerance else ()), *((coarse,) if lengths > LONGEST_ELEMENT else ()))
         return ChosenPlant(self.needle(count), error, warnings, round_off=self.round_off(count), ladder=self)
 
     def round_off(self, count: int) -> float:

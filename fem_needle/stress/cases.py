@@ -13,7 +13,7 @@ import numpy as np
 from fem_needle.stress.draws import random_numbers
 from fem_needle.stress.fine import fine_mesh, many_steps, small_deflections
 from fem_needle.stress.numbers import BESIDE, NODES, THINNEST, LayerNumbers, Numbers
-from fem_needle.stress.trial import Trial, examine
+from fem_needle.stress.trial import ROUGH, Trial, examine
 
 MODELS: tuple[int | None, ...] = (None, 2, 8)  # finite elements, two modes, eight
 EXACT_EVERY = 10  # random scenes are compared with exact solutions
@@ -73,7 +73,9 @@ def _random(modes: int | None, count: int, first_seed: int) -> Case:
 
 def _drawn(modes: int | None, seeds: tuple[int, ...]) -> list[Trial]:
     name = model_name(modes)
-    return [examine(f"seed {seed}, {name}", random_numbers(seed), modes, brief=seed % EXACT_EVERY > 0) for seed in seeds]
+    return [
+        examine(f"seed {seed}, {name}", random_numbers(seed), modes, brief=seed % EXACT_EVERY > 0, same=ROUGH) for seed in seeds
+    ]
 
 
 def _both(**changes: Any) -> tuple[Numbers, Numbers]:

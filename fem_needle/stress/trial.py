@@ -22,6 +22,7 @@ from fem_needle.trajectory import ENERGY_BOUND, VARIABLES, Trajectory
 Array = NDArray[np.float64]
 
 SAME = 1e-9  # of the largest value: how closely runs must agree that differ in sign, units or direction only
+ROUGH = 1e-6  # the same of random scenes, whose equations may lose half of all digits
 DEPENDENT = 1e-3  # the same of many modes, nearly dependent over a short inserted part: the tolerance
 FEW_MODES = 2
 INSERTED = 1e-6  # of the length: less of an `entry` needle counts as nothing
@@ -94,15 +95,17 @@ class Trial:
         return self.crash or ", ".join(f"{figure.name} {figure.value:.2g} > {figure.bound:g}" for figure in failed)
 
 
-def examine(name: str, numbers: Numbers, modes: int | None, *, brief: bool = False) -> Trial:
+def examine(name: str, numbers: Numbers, modes: int | None, *, brief: bool = False, same: float = SAME) -> Trial:
     """Put a scene through all checks, by finite elements or by so many assumed modes.
 
-    In brief: mirrored and in other units at once, and no automatic mesh beside the exact solution.
+    In brief: mirrored and in other units at once, and no automatic mesh beside the exact solution. ``same``: how closely such
+    runs must agree, over the largest value.
     """
+    same = same if (modes or 0) <= FEW_MODES else DEPENDENT
     try:
         run = _run(numbers, modes)
         changed = _changed_at_once if brief else _changed
-        figures = [*_of_run(run), *changed(numbers, modes, run), *_equilibrium(numbers, modes)]
+        figures = [*_of_run(run), *changed(numbers, modes, run, same), *_equilibrium(numbers, modes)]
         if not brief:
             figures += _automatic(numbers, modes)
     except (NeedleError, ValidationError) as error:
@@ -139,9 +142,9 @@ def _of_run(run: Trajectory) -> Iterator[Figure]:
     yield Figure("energy", float(run.summary["relative_energy_residual"]), ENERGY_BOUND)
 
 
-def _changed(numbers: Numbers, modes: int | None, run: Trajectory) -> Iterator[Figure]:
+def _changed(numbers: Numbers, modes: int | None, run: Trajectory, same: float) -> Iterator[Figure]:
     """Run the scene turned round, in other units and, through equilibria, compare the way out with the way in."""
-    tip, same = run.tip_deflection, SAME if (modes or 0) <= FEW_MODES else DEPENDENT
+    tip = run.tip_deflection
     yield Figure("mirror", _apart(-_run(numbers, modes, mirrored=True).tip_deflection, tip), same)
     scaled = _run(numbers, modes, OTHER).tip_deflection
     yield Figure("units", _apart(scaled / OTHER.length, tip), same)
@@ -149,9 +152,8 @@ def _changed(numbers: Numbers, modes: int | None, run: Trajectory) -> Iterator[F
         yield Figure("way back", _apart(tip[::-1], tip), same)
 
 
-def _changed_at_once(numbers: Numbers, modes: int | None, run: Trajectory) -> Iterator[Figure]:
+def _changed_at_once(numbers: Numbers, modes: int | None, run: Trajectory, same: float) -> Iterator[Figure]:
     """Run the scene turned round and in other units."""
-    same = SAME if (modes or 0) <= FEW_MODES else DEPENDENT
     changed = _run(numbers, modes, OTHER, mirrored=True).tip_deflection
     yield Figure("mirror and units", _apart(-changed / OTHER.length, run.tip_deflection), same)
 
