@@ -16,7 +16,7 @@ RANDOM_SCENES, LONG_RANDOM_SCENES = 500, 10_000
 SHOWN_FAILURES = 20
 HEADER = """# Stress
 
-Made by `fem-needle stress{} --out docs/stress.md`. What is counted, and what the figures mean: [robustness](robustness.md).
+Made by `fem-needle stress{} --scenes {} --out docs/stress.md`. What is counted, and what the figures mean: [robustness](robustness.md).
 
 """
 
@@ -101,7 +101,7 @@ class StressTable(Shown):
             *("| " + " | ".join(row.cells()) + " |" for row in self.rows),
             *(f"\nFAILED {line}" for line in self.shown_failures()),
         ]
-        return HEADER.format(" --long" if self.long else "") + "\n".join(lines) + "\n"
+        return HEADER.format(" --long" if self.long else "", self.random_scenes) + "\n".join(lines) + "\n"
 
 
 def stress(

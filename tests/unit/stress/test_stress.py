@@ -159,7 +159,7 @@ def test_the_command_shows_a_table_and_fails_with_it(stress, monkeypatch, tmp_pa
     assert status == 1 and "meshes" in out
     assert "1 failures" in err and "b: tip 1e-06 > 1e-09" in err
     page = (tmp_path / "page.md").read_text()
-    assert "`fem-needle stress --long --out" in page and "3 random scenes of each model, the first with seed 5" in page
+    assert "`fem-needle stress --long --scenes 3 --out" in page and "3 random scenes of each model, the first with seed 5" in page
 
 
 @pytest.mark.parametrize(("option", "value", "least"), [("--scenes", "-1", 0), ("--seed", "-2", 0), ("--processes", "0", 1)])
