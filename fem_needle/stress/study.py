@@ -16,7 +16,8 @@ RANDOM_SCENES, LONG_RANDOM_SCENES = 500, 10_000
 SHOWN_FAILURES = 20
 HEADER = """# Stress
 
-Made by `fem-needle stress{} --scenes {} --out docs/stress.md`. What is counted, and what the figures mean: [robustness](robustness.md).
+Made by `fem-needle stress{} --scenes {} --out docs/stress.md`.
+What is counted, and what the figures mean: [robustness](robustness.md).
 
 """
 
