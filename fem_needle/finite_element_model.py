@@ -51,7 +51,8 @@ class FiniteElementModel:
             finer = _given_mesh(scene, 2)
         except SceneError:  # more elements than are allowed, or smaller ones
             return ChosenPlant(plant, None)
-        return ChosenPlant(plant, meshes.between(plant, finer))
+        error, tolerance = meshes.between(plant, finer), scene.numerics.tolerance
+        return ChosenPlant(plant, error, _missed(plant, error, tolerance))
 
 
 FAMILY = FiniteElementModel()
@@ -131,13 +132,12 @@ class Meshes:
         """Return the choice of one of the needles, whose error in motion is known, relative to the largest tip deflection."""
         count, tolerance = int(plant.describe()["elements"]), self.scene.numerics.tolerance
         error = max(error, self.error(count))
-        missed = f"the tolerance {tolerance:g} was not reached with {count} elements: see error_estimate"
         lengths = self.decay_lengths(count)
         coarse = (
             f"each of {count} elements is {lengths:.2g} decay lengths (4 EI / k)^(1/4) long > {LONGEST_ELEMENT:g}: the tolerance "
             "may be missed without a sign of it; give more elements, or a mesh that is fine where forces act"
         )
-        warnings = (*((missed,) if error > tolerance else ()), *((coarse,) if lengths > LONGEST_ELEMENT else ()))
+        warnings = (*_missed(plant, error, tolerance), *((coarse,) if lengths > LONGEST_ELEMENT else ()))
         return ChosenPlant(self.needle(count), error, warnings, round_off=self.round_off(count), ladder=self)
 
     def round_off(self, count: int) -> float:
@@ -149,6 +149,12 @@ class Meshes:
         places, tips = instants(plant, MESH_INSTANTS), np.abs(static_tips(plant, MESH_INSTANTS))
         time, depth = places[int(np.argmax(tips))]
         return round_off(plant, depth, time, stepped=self.analysis == "dynamic" or plant.foundation.is_damped)
+
+
+def _missed(plant: Plant, error: float, tolerance: float) -> tuple[str, ...]:
+    if error <= tolerance:
+        return ()
+    return (f"the tolerance {tolerance:g} was not reached with elements = {plant.describe()['elements']}: see error_estimate",)
 
 
 def _given_mesh(scene: Scene, parts: int) -> FiniteElementNeedle:

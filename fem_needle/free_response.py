@@ -35,6 +35,21 @@ def frozen_matrices(plant: Plant, depth: float, time: float) -> tuple[Array, Arr
     return reduced(operators.mass), reduced(operators.damping), stiffness, basis.T
 
 
+def vibrations(mass: Array, stiffness: Array) -> tuple[Array, Array]:
+    """Return omega^2, rising, and the shapes of unit mass of mass phi = (1 / omega^2) stiffness phi, stiffness positive.
+
+    The slow ones keep all their digits this way round; stiffness phi = omega^2 mass phi loses eps of the largest omega^2.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the stiffness is not positive.
+    """
+    inverse, shapes = eigh(mass, stiffness)
+    inverse, shapes = inverse[::-1], shapes[:, ::-1]
+    return 1.0 / inverse, shapes / np.sqrt(inverse)
+
+
 def natural_frequencies(plant: Plant, depth: float, time: float = 0.0) -> Array:
     """Return the undamped natural frequencies at a frozen depth [rad/s], rising."""
     mass, _, stiffness, _ = frozen_matrices(plant, depth, time)

@@ -12,11 +12,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from fem_needle import banded
 from fem_needle.collocation import Collocation, collocation
-from fem_needle.free_response import frozen_matrices
+from fem_needle.free_response import frozen_matrices, vibrations
 from fem_needle.initial import initial_state
 from fem_needle.ledger import StepEnd
 from fem_needle.loads import is_steady, turns_with_needle
@@ -67,9 +66,7 @@ class Vibration:
         """Natural frequencies [rad/s], shapes of the free coordinates, amplitudes of cosines and sines."""
         instant, clamped = self.origin.stage.instant, self.plant.prescribed
         mass, _, stiffness, basis = frozen_matrices(self.plant, instant.depth, instant.time)
-        # The other way round the lowest frequencies, which matter most, keep all their digits.
-        inverse_squares, vectors = eigh(mass, stiffness)
-        vectors = vectors[:, ::-1] / np.sqrt(inverse_squares[::-1])
+        vectors = vibrations(mass, stiffness)[1]
         squares = _quotients(stiffness, mass, vectors)
         shapes = basis.T @ vectors
         weighed = banded.trailing(self.origin.stage.operators.mass, clamped)
@@ -95,7 +92,6 @@ class Vibration:
         stage = replace(self.origin.stage, instant=replace(self.origin.stage.instant, time=time))
         forces = self.origin.solution.forces
         return StepEnd(stage, StageSolution(coordinates, velocities, momentum(stage, coordinates, velocities), forces))
-
 
     def over(self, times: Array) -> tuple[Array, Array]:
         """Return coordinates and velocities at many times [s] (T, n)."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from fem_needle import banded
+from fem_needle.free_response import vibrations
 from fem_needle.motion import run_duration
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene, Sinusoid, Table, TipLoad
@@ -53,7 +53,7 @@ def spectrum_of(plant: Plant, moving: int) -> Spectrum:
         return banded.to_dense(band) / factor
 
     mass = unit(MASS, needle.mass_per_length)
-    roots, shapes = eigh(unit(BENDING, needle.bending_stiffness), mass)
+    roots, shapes = vibrations(mass, unit(BENDING, needle.bending_stiffness))
     lowest = shapes[:, :moving]
 
     def between(kind: int, factor: float) -> Array:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from fem_needle.errors import ComputationError, SceneError
+from fem_needle.free_response import vibrations
 from fem_needle.linear.model import LinearModel, SecondOrder, Signal
 
 Array = NDArray[np.float64]
@@ -64,7 +64,7 @@ def modal(model: LinearModel, modes: int | None = None) -> LinearModel:
 
 
 def _vibrations(parts: SecondOrder, lateral: Array) -> tuple[Array, Array]:
-    """Return omega^2, rising, and the shapes: as mass phi = (1 / omega^2) stiffness phi, which is accurate for the slow ones.
+    """Return omega^2, rising, and the shapes of unit mass, their tips at positive deflections.
 
     Raises
     ------
@@ -73,13 +73,10 @@ def _vibrations(parts: SecondOrder, lateral: Array) -> tuple[Array, Array]:
     """
     mass, stiffness = (_symmetric(matrix[np.ix_(lateral, lateral)]) for matrix in (parts.mass, parts.stiffness))
     try:
-        inverse, shapes = eigh(mass, stiffness)
+        squares, shapes = vibrations(mass, stiffness)
     except np.linalg.LinAlgError:
         raise ComputationError("the lateral stiffness is not positive: the needle has no vibrations there") from None
-    order = np.argsort(-inverse)
-    inverse, shapes = inverse[order], shapes[:, order]
-    upward = np.where(parts.rows[0, lateral] @ shapes < 0.0, -1.0, 1.0)  # every shape with its tip at positive deflections
-    return 1.0 / inverse, shapes * upward / np.sqrt(inverse)
+    return squares, shapes * np.where(parts.rows[0, lateral] @ shapes < 0.0, -1.0, 1.0)
 
 
 def lateral_frequencies(model: LinearModel) -> Array:

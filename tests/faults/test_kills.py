@@ -82,15 +82,14 @@ def test_a_run_killed_anywhere(tmp_path, count):
                                     pytest.param(signal.SIGHUP, marks=pytest.mark.slow)])  # fmt: skip
 def test_a_run_that_is_ended_keeps_what_was_computed(tmp_path, number):
     folder = tmp_path / "run"
-    process = start(folder, *LONG, "--no-vtk", "--set", "numerics.output_points=2")
-    after(folder, 0)
-    time.sleep(0.3)
+    process = start(folder, *LONG, "--set", "numerics.output_points=2")
+    after(folder, 3)
     process.send_signal(number)
     _, err = process.communicate(timeout=60)
     assert (process.returncode, "Traceback" in err) == (1, False), err
     assert "interrupted" in err
     assert state(folder) == "interrupted"
-    assert len(load_run(folder).time) >= 1  # on a slow machine no more than the start
+    assert len(load_run(folder).time) > 1
     assert problems(folder) == []
 
 

@@ -107,13 +107,13 @@ def pushed_reference(model, case):
 
 
 def pushed(model, case):
-    """Errors and numbers of steps of a push."""
+    """Errors and numbers of steps of a push: first and last of three halvings, whose last errors are near the reference's own."""
     plant, true, errors, counts = model.plant(pushed_scene(model, case)), pushed_reference(model, case), [], []
-    for step in STEPS[:3]:
+    for step in STEPS:
         run = simulate(plant, time_step=step, analysis="dynamic", output_step=DURATION)
         errors.append(np.max(np.abs(np.array([run.depth[-1] - 0.1, run.tip_deflection[-1]]) / true - 1.0)))
         counts.append(run.summary["steps"])
-    return errors, counts
+    return errors[::3], counts[::3]
 
 
 # A lateral force at a hub needle, or the push, commanded four times; the command holds until the next one.

@@ -53,4 +53,4 @@ def test_the_document_has_the_measured_orders():
             assert (cell == "") == (value is None), name
             if value is not None:
                 assert float(cell) == pytest.approx(value, abs=0.1), name
-                assert value > float(order) - 0.25, name  # a push on modes shows 3.78 at these steps
+                assert value > float(order) - 0.2, name

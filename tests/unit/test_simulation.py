@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fem_needle import ComputationError, FiniteElementNeedle, run_scene, simulate
+from fem_needle import ComputationError, FiniteElementNeedle, load_scene, run_scene, simulate
 from fem_needle.legs import equilibria
 from fem_needle.march import TimeGrid, output_times, time_grid
 from fem_needle.scene import Sinusoid, TipLoad
@@ -154,6 +154,14 @@ def test_a_tolerance_that_is_not_reached_is_told(monkeypatch):
     told = run.summary["warnings"]
     assert ["was not reached" in text for text in told] == [True, False]
     assert "the energy balance lacks" in told[1]
+
+
+@pytest.mark.parametrize(("modulus", "is_missed"), [(500.0, False), (1e6, True)])
+def test_elements_that_miss_the_tolerance_are_told(modulus, is_missed):
+    scene = load_scene("bench-m").with_value("tissue.layers.0.foundation_modulus", modulus)
+    run = run_scene(scene, elements=2, analysis="static", output_step=0.4)
+    assert (run.summary["error_estimate"] > 1e-3) is is_missed
+    assert (run.summary["warnings"] == ["the tolerance 0.001 was not reached with elements = 2: see error_estimate"]) is is_missed
 
 
 def test_reversal_holds_and_reinsertion():

@@ -74,5 +74,11 @@ def test_time_steps_on_a_fine_mesh_warn():
     assert any("rounding may cost" in message for message in run.summary["warnings"])
 
 
+def test_cosines_on_a_fine_mesh_do_not():
+    """Time steps would lose 7e-7 on 128 elements."""
+    warned = run_scene(load_scene("bench-d"), elements=128, tolerance=5e-7).summary["warnings"]
+    assert warned == ["the tolerance 5e-07 was not reached with elements = 128: see error_estimate"]
+
+
 def test_equilibria_on_a_fine_mesh_do_not():
     assert run_scene(load_scene("bench-s"), elements=1000, output_step=1.0).summary["warnings"] == []
