@@ -45,8 +45,8 @@ def has(scene, analysis):
 
 
 def speed_of(*case):
-    """Return a case of (name, analysis, model), marked where both models of a costly one need not run each time."""
-    slow = case[2] == "elements" and ("pushed" in case[0] or "path" in case[0])
+    """Return a case of (name, analysis, model), marked where it is costly and one like it runs each time."""
+    slow = ("pushed" in case[0] and case[0] != "entry, pushed") or (case[2] == "elements" and "path" in case[0])
     return pytest.param(*case, marks=pytest.mark.slow) if slow else case
 
 

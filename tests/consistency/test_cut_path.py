@@ -104,7 +104,7 @@ def test_a_stiff_displaced_needle_feels_only_what_was_not_cut():
     assert run.tissue_energy == pytest.approx(0.5 * 5e4 * 4e-6 * 0.04, rel=1e-4)
 
 
-@pytest.mark.parametrize("kind", ["entry", "hub"])
+@pytest.mark.parametrize("kind", ["entry", pytest.param("hub", marks=pytest.mark.slow)])
 def test_a_constant_tip_force_steers_with_constant_curvature(kind):
     """Far from both ends the path is r'' = F / (beta EI), beta = (k / 4EI)^(1/4).
 
@@ -200,7 +200,7 @@ def final_tip(kind, time_step, elements, analysis="quasi-static"):
     return run_of(scene, time_step, analysis=analysis, output_step=1.0, elements=elements).tip_deflection[-1]
 
 
-@pytest.mark.parametrize("kind", ["entry", "hub"])
+@pytest.mark.parametrize("kind", ["entry", pytest.param("hub", marks=pytest.mark.slow)])
 def test_order_in_time(kind):
     """Smooth after the jump, which leaves second order at least."""
     steps = (0.2, 0.1, 0.05, 0.025)
@@ -240,13 +240,14 @@ SWELLS = {"tissue": {"rest_line": "cut-path", "stiffness_factor": Table(time=[0.
 
 
 @pytest.mark.parametrize("kind", ["entry", "hub"])
-@pytest.mark.parametrize(("insertion", "parts"), [(TURNING, CUT), (moving(1.0, 0.07, 0.08), SWELLS)], ids=["turns", "swells"])
+@pytest.mark.parametrize(
+    ("insertion", "parts"),
+    [(TURNING, CUT), pytest.param(moving(1.0, 0.07, 0.08), SWELLS, marks=pytest.mark.slow)],
+    ids=["turns", "swells"],
+)
 @pytest.mark.parametrize(
     "analysis",
-    [
-        "dynamic",
-        "quasi-static",
-    ],
+    ["dynamic", "quasi-static"],
 )
 def test_ledger(kind, insertion, parts, analysis):
     """A needle that turns in its path, and one in a tissue that swells: the residual falls with the step."""

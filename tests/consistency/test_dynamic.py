@@ -125,7 +125,7 @@ def test_order_in_time_at_a_fixed_depth(kind, radius, order):
     assert errors[-1] < 1e-4
 
 
-@pytest.mark.parametrize("guides", [(), (Guide(position=-0.0317, stiffness=2e3),)])
+@pytest.mark.parametrize("guides", [pytest.param((), marks=pytest.mark.slow), (Guide(position=-0.0317, stiffness=2e3),)])
 def test_order_in_time_of_a_moving_hub_needle(guides):
     errors = time_errors("hub", GLIDE, 1.0, guides)
     assert min(rates(errors, floor=ROUND_OFF)) > 3.0

@@ -171,7 +171,7 @@ BROKEN = {
 
 @pytest.mark.parametrize(
     ("loop", "place", "name"),
-    [(loop, *term) for loop, terms in BROKEN.items() for term in terms],
+    [pytest.param(loop, *term, marks=[pytest.mark.slow] * (loop == "numpy")) for loop, terms in BROKEN.items() for term in terms],
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_a_broken_term_shows(monkeypatch, loop, place, name):

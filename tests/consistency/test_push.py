@@ -123,7 +123,7 @@ def changes_of(run):
     return np.count_nonzero(np.diff(np.sign(run.speed)))
 
 
-@pytest.mark.parametrize("analysis", ["dynamic", "quasi-static"])
+@pytest.mark.parametrize("analysis", ["dynamic", pytest.param("quasi-static", marks=pytest.mark.slow)])
 def test_sticking_is_the_same_for_all_steps(analysis):
     expected = rigid_rod(0.5)
     assert expected.changes > 8
@@ -244,6 +244,7 @@ def open_loop(kinematics, time_step, output_step=2.5e-5):
     return run_of(scene, time_step, output_step=output_step, elements=12)
 
 
+@pytest.mark.slow
 def test_the_thesis_needle_tends_to_its_speed():
     """3 N against 0.56 N and 0.3 N s/m: 8.13 m/s (1 - exp(-t / 6.8 ms)) but for A, which is small; 18 cm after 26 ms."""
     run = open_loop("material", 2e-5, 1e-3)
@@ -276,9 +277,9 @@ def test_the_thesis_tip_and_its_ledger(kinematics, largest):
 @pytest.mark.parametrize(
     ("kind", "parts"),
     [
-        ("hub", {}),
+        pytest.param("hub", {}, marks=pytest.mark.slow),
         ("entry", {}),
-        ("entry", {"model": Model(kinematics="fixed-frame")}),
+        pytest.param("entry", {"model": Model(kinematics="fixed-frame")}, marks=pytest.mark.slow),
         pytest.param("hub", {"tissue": {"rest_line": "cut-path"}}, marks=pytest.mark.slow),
     ],
 )

@@ -39,6 +39,7 @@ def name_of(path):
 
 
 QUICK = [path for path in PAGES if any(block.language not in ("text", "{toctree}") for block in chosen(path, slow=False))]
+LONG = ("my-controller", "matlab")  # take some seconds each
 SLOW = [path for path in PAGES if any(block.is_slow for block in blocks(path))]
 
 
@@ -131,7 +132,9 @@ def reader(tmp_path, monkeypatch, command_line, capsys):
     return Reader(tmp_path, command_line, capsys)
 
 
-@pytest.mark.parametrize("page", QUICK, ids=name_of)
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, id=name_of(page), marks=[pytest.mark.slow] * (page.stem in LONG)) for page in QUICK]
+)
 def test_what_a_page_shows_runs(page, reader):
     for block in chosen(page, slow=False):
         reader.follow(block)

@@ -18,6 +18,7 @@ def digests(threads, *more):
     return done.stdout.splitlines()
 
 
+@pytest.mark.slow
 def test_one_and_eight_threads_give_the_same_bits():
     alone = digests(1)
     assert len(alone) == 2

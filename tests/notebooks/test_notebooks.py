@@ -31,7 +31,7 @@ def test_a_notebook_is_its_script_without_outputs(path):
 
 @pytest.mark.filterwarnings("ignore")  # of the client's own loop and sockets
 @pytest.mark.parametrize(
-    "path", [pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem == "05_control")) for path in NOTEBOOKS]
+    "path", [pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem[:2] > "02")) for path in NOTEBOOKS]
 )
 def test_a_notebook_runs_and_draws(path, tmp_path):
     notebook = nbformat.read(path, as_version=4)

@@ -72,7 +72,7 @@ def test_full_length_modes_work_on_a_short_inserted_part(modes, depth, modulus):
     assert abs(tip_error(scene, depth, modes=modes)) < bound
 
 
-@pytest.mark.parametrize("kinematics", ["material", "fixed-frame"])
+@pytest.mark.parametrize("kinematics", ["material", pytest.param("fixed-frame", marks=pytest.mark.slow)])
 def test_many_full_length_modes_travel_from_a_shallow_depth(kinematics):
     scene = scene_of("entry", moving(3.0, 1e-3, 0.03), DAMPED, model=Model(kinematics=kinematics), duration=None)
     settings = {"time_step": 2e-5, "analysis": "dynamic", "output_step": 1e-3}
@@ -113,7 +113,7 @@ def test_static_corrections_mend_the_statics(basis, layers, depth):
     assert mended < max(2e-3 * plain, 1e-8)
 
 
-@pytest.mark.parametrize("static_corrections", [False, True])
+@pytest.mark.parametrize("static_corrections", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kinematics", ["material", "fixed-frame"])
 @pytest.mark.parametrize("basis", ["full-length", "inserted-length"])
 def test_modes_converge_to_the_elements_in_motion(basis, kinematics, static_corrections):
@@ -145,7 +145,7 @@ def test_frequencies_of_modes_lie_above_and_converge(support):
 
 
 @pytest.mark.parametrize("variant", ["conservative", "corrected"])
-@pytest.mark.parametrize("tissue", ["foundation", "tip-spring"])
+@pytest.mark.parametrize("tissue", ["foundation", pytest.param("tip-spring", marks=pytest.mark.slow)])
 def test_a_push_against_an_independent_integration(variant, tissue):
     scene = pushed(variant, tissue, friction=True)
     plant = AssumedModeNeedle(scene)
@@ -182,7 +182,7 @@ def test_a_prescribed_motion_against_an_independent_integration():
     assert np.max(np.abs(run.tip_deflection - tips)) < 1e-6 * np.max(np.abs(tips))
 
 
-@pytest.mark.parametrize("kinematics", ["material", "fixed-frame"])
+@pytest.mark.parametrize("kinematics", ["material", pytest.param("fixed-frame", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("tissue", ["foundation", "tip-spring"])
 def test_energy_minus_work_is_constant(tissue, kinematics):
     scene = pushed("conservative", tissue, friction=False).with_value("model.kinematics", kinematics)
@@ -205,6 +205,7 @@ def test_without_the_axial_force_energy_drifts():
     assert run.summary["relative_energy_residual"] < 1e-4  # the lateral ledger still closes: A is in it
 
 
+@pytest.mark.slow
 def test_the_open_loop_of_the_thesis():
     values = {"model.kind": "assumed-modes", "model.variant": "corrected", "numerics.time_step": 3e-5}
     run = run_scene(load_scene("thesis-open-loop").with_values(values))
@@ -224,7 +225,7 @@ def test_more_modes_are_pushed_like_the_elements(modes):
     assert run.summary["stop_reason"] == "duration"
 
 
-@pytest.mark.parametrize("step", [2e-4, 5e-5])
+@pytest.mark.parametrize("step", [2e-4, pytest.param(5e-5, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("modes", [3, 12, 30])
 def test_full_length_modes_are_stable_at_coarse_steps(modes, step):
     """Combinations of modes that a step does not resolve grow with the depth: they must be damped."""

@@ -46,6 +46,7 @@ def test_what_cannot_be_right_is_read_off_the_printed_table():
         assert said in text
 
 
+@pytest.mark.slow
 def test_repetitions_differ_and_are_the_same_again():
     scene = table_iv.scene_of(10.0).with_value("numerics.elements", 3)
     errors = table_iv.insertions(scene, repetitions=2).errors

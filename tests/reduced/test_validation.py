@@ -37,7 +37,7 @@ def committed(title):
     return found.rstrip() + "\n"
 
 
-@pytest.mark.parametrize("name", page.AT_REST)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "thesis")) for name in page.AT_REST])
 def test_a_section_at_rest_is_current(name):
     found = page.AT_REST[name]()
     assert found.markdown == committed(found.title)

@@ -161,6 +161,7 @@ def test_gauss_keeps_the_energy_of_a_held_needle():
     assert np.ptp(motion.tip_deflection) > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "solve"), [("entry", entry_motion), ("hub", hub_motion)])
 def test_slow_insertion_follows_the_statics(kind, solve):
     scene = scene_of(kind, moving(0.01), LAYERS)
@@ -172,6 +173,7 @@ def test_slow_insertion_follows_the_statics(kind, solve):
     assert largest_difference(motion.tip_deflection, np.array(expected)) < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kinematics", ["material", "fixed-frame"])
 @pytest.mark.parametrize("speed", [3.0, -3.0])
 def test_energy_balance_of_the_growing_beam(kinematics, speed):
@@ -194,6 +196,7 @@ def test_energy_balance_of_the_growing_beam(kinematics, speed):
     assert abs(simpson(axial[:, 0] * speed, x=time)) > 0.1 * np.max(motion.energy)
 
 
+@pytest.mark.slow
 def test_energy_balance_of_the_whole_needle():
     """E' = F u_t(tip) + P u_t at the force + 1/2 k v u^2 at the surface: the tissue takes hold of a bent needle."""
     loads = [TipLoad(force=BUZZ), LateralLoad(position=-0.01, force=0.3)]
@@ -210,7 +213,7 @@ def test_energy_balance_of_the_whole_needle():
     assert simpson(grip, x=time) > 0.1 * np.max(motion.energy)
 
 
-@pytest.mark.parametrize("kinematics", ["material", "fixed-frame"])
+@pytest.mark.parametrize("kinematics", ["material", pytest.param("fixed-frame", marks=pytest.mark.slow)])
 def test_entry_converges(kinematics):
     loads = [TipLoad(force=BUZZ), TipLoad(bevel_coefficient=1e-6)]
     scene = scene_of("entry", moving(3.0, 0.02, 0.13), LAYERS, loads, model=Model(kinematics=kinematics))

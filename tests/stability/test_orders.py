@@ -10,10 +10,7 @@ from tests.stability import orders
 DOCUMENT = Path(__file__).parents[2] / "docs" / "robustness.md"
 ROWS = {name: (order, cells) for name, order, cells in orders.rows()}
 QUICK = (
-    "collocation, radius 1 (Gauss), modes, entry",
     "compiled loop, radius 1, elements, entry",
-    "compiled loop, radius 0, elements, entry",
-    "creep (Radau), compiled, elements, entry",
     "commanded force, compiled, elements, hub",
     "loop over many runs, vibrations",
 )

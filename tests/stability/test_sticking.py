@@ -104,7 +104,7 @@ def left_alone(kind, elements, step):
     return scene, simulate(plant, time_step=step, analysis="dynamic", output_step=0.05)
 
 
-@pytest.mark.parametrize("kind", ["entry", "hub"])
+@pytest.mark.parametrize("kind", ["entry", pytest.param("hub", marks=pytest.mark.slow)])
 def test_a_stuck_needle_holds_its_residual_force(kind):
     """Depth, force and tip of the stuck needle converge over elements; the force to A of the exact static solution there."""
     found = []
@@ -176,7 +176,7 @@ def along(path):
     return np.interp(np.linspace(0.06, 0.12, 7), path[0][1:], path[1][1:])
 
 
-@pytest.mark.parametrize("kind", ["entry", "hub"])
+@pytest.mark.parametrize("kind", ["entry", pytest.param("hub", marks=pytest.mark.slow)])
 def test_the_path_converges_in_step_and_mesh(kind):
     """The whole path, not its end alone."""
     paths = [along(path_of(kind, step)) for step in (1 / 16, 1 / 32, 1 / 64)]

@@ -77,6 +77,7 @@ def test_the_picture_of_no_error_at_all_is_drawn(compare, tmp_path):
     assert_drawn(tmp_path / "study" / "compare.png", (468, 1200))
 
 
+@pytest.mark.slow
 def test_a_model_without_statics_is_shown_in_its_run_with_its_warnings(compare, tmp_path):
     status, out, err = compare(*PRINTED, "--elements", "4", "--out", "study")
     assert status == 0

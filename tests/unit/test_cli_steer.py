@@ -278,6 +278,7 @@ def test_repetitions_leave_a_study(run, scene):
     assert len(set(png_size_and_pixels(folder / "steer.png")[1])) > 20
 
 
+@pytest.mark.slow
 def test_repetitions_are_the_same_in_any_number_of_processes(scene):
     one, two = (repeat(scene, 3, processes=processes) for processes in (1, 2))
     assert one.to_dict() == two.to_dict()

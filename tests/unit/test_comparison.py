@@ -90,6 +90,7 @@ def test_the_finite_elements_agree_with_themselves():
     assert [(part.start, part.end) for part in model.ranges] == [(0.02, 0.06)]
 
 
+@pytest.mark.slow
 def test_both_sides_have_the_kinematics_that_the_variant_implies(pushed):
     assert pushed.kinematics == "fixed-frame"
     runs = [answer.run.run for answer in pushed.answers]
@@ -131,6 +132,7 @@ def test_a_scene_without_loads_is_bent_by_a_force_at_the_tip(pushed, held):
     assert pushed.models[0].answer.chosen.tips[-1] == pytest.approx(compliance, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::fem_needle.errors.SuspiciousValueWarning")
 def test_the_printed_equations_are_compared_in_the_run_alone():
     found = compare(load_scene("thesis-open-loop").with_values(PUSHED), variant="as-printed", elements=8)
@@ -224,6 +226,7 @@ def test_differences_by_zero_are_infinite_or_none():
     assert relative_difference(np.array([0.0, 1.0, 3.0]), np.array([0.0, 0.0, -2.0])).tolist() == [0.0, np.inf, 2.5]
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_early_is_infinitely_wrong_and_says_so(monkeypatch):
     """A model that a push drives too fast agrees with the reference for as long as both go on: that is no agreement."""
     real, calls = runs.simulate, []

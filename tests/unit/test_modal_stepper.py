@@ -15,12 +15,16 @@ CASES = {
     "entry, loaded, from straight": scene_of("entry", held(0.17), LAYERS, initial=Initial(shape="straight"), duration=0.01),
     "hub": scene_of("hub", held(0.1), LAYERS, LOADS, initial=RELEASED, support={"hub_angle": 0.01}, duration=0.02),
 }
+MAKERS = [
+    lambda scene: FiniteElementNeedle(scene, elements=2),
+    pytest.param(lambda scene: AssumedModeNeedle(scene, modes=3), marks=pytest.mark.slow),
+]
 SHAPE = ("tip_deflection", "tip_angle", "tissue_force")
 REACTIONS = ("hub_force", "hub_moment", "push_force")  # their rates are of second order in a step
 ENERGIES = ("kinetic_energy", "bending_energy", "tissue_energy", "load_work")
 
 
-@pytest.mark.parametrize("make", [lambda s: FiniteElementNeedle(s, elements=2), lambda s: AssumedModeNeedle(s, modes=3)])
+@pytest.mark.parametrize("make", MAKERS)
 @pytest.mark.parametrize("name", CASES)
 def test_cosines_are_what_small_steps_approach(name, make):
     """Few coordinates, so that small steps resolve every vibration, rates and reactions included."""
@@ -49,6 +53,7 @@ def test_the_estimate_bounds_the_error_of_a_release(tolerance):
     assert any(skipped["term"] == "time steps" for skipped in run.summary["skipped"])
 
 
+@pytest.mark.slow
 def test_what_cannot_be_reached_is_said():
     with pytest.raises(SceneError, match=r"less than double precision keeps .*got 1e-08; allowed from") as caught:
         run_scene(load_scene("bench-d").with_values({"run.duration": 0.02, "numerics.tolerance": 1e-8}))

@@ -51,7 +51,7 @@ def test_the_table_names_model_modes_variant_and_basis(run, monkeypatch):
 
 
 def test_static_corrections_are_an_option(run, tmp_path):
-    options = ("--modes", "1", "--static-corrections", "--output-step", "4", "--no-vtk")
+    options = ("--modes", "1", "--static-corrections", "--output-step", "4", "--analysis", "static", "--no-vtk")
     status, out, _ = run("thesis", "--model", "assumed-modes", *options)
     assert status == 0
     assert "1 mode, 2 static corrections" in out

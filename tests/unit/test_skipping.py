@@ -75,8 +75,8 @@ def test_the_bound_covers_what_inertia_does(speed):
 
 @pytest.mark.parametrize("kind", ["entry", "hub"])
 @pytest.mark.parametrize("kinematics", ["material", "fixed-frame"])
-@pytest.mark.parametrize("speed", [0.1, 1.0])
-@pytest.mark.parametrize("damping", [0.0, 2.0])
+@pytest.mark.parametrize("speed", [pytest.param(0.1, marks=pytest.mark.slow), 1.0])
+@pytest.mark.parametrize("damping", [pytest.param(0.0, marks=pytest.mark.slow), 2.0])
 def test_the_bound_covers_a_start_from_rest(kind, kinematics, speed, damping):
     """The momentum v S q of the convective inertia jumps with the speed, also where the rates of the coordinates hardly do."""
     if kind == "hub" and kinematics == "fixed-frame":

@@ -159,6 +159,7 @@ def test_friction_from_the_push_of_a_run():
     assert [one.value for one in found.parameters] == pytest.approx([0.56, 0.3], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_modulus_from_a_vibration():
     """A needle let go: its run needs no time steps, and a fit must not give it any."""
     scene = load_scene("release").with_value("numerics.elements", 3)

@@ -107,6 +107,7 @@ def test_the_simulated_run_obeys_the_closed_form():
     assert run["depth"] - 0.08 == pytest.approx(expected, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_repeated_experiments():
     """Three repetitions; each error is within five of its own standard errors, and the seed repeats them."""
     scene = load_scene("friction-ramp")
