@@ -68,6 +68,8 @@ _HOMES = {
     "fem_needle.scene",
 )
 
+__all__ = sorted(_HOMES)  # noqa: PLE0605 (names are what `_HOMES` says)
+
 
 def __getattr__(name: str) -> Any:
     """Import a public name from its module."""
@@ -78,4 +80,4 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """List the public names."""
-    return sorted(_HOMES)
+    return __all__

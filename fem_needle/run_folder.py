@@ -20,7 +20,7 @@ from fem_needle.folder_lock import FolderLock, is_locked
 from fem_needle.manifest import FAILED, FINISHED, INTERRUPTED, RUNNING, is_run_folder, manifest, state_of
 from fem_needle.manifest import FILE as MANIFEST
 from fem_needle.plant import Plant
-from fem_needle.run_target import RunTarget
+from fem_needle.run_target import RunTarget, study_in
 from fem_needle.samples import Sample
 from fem_needle.scene import Scene
 from fem_needle.scene.steering import SIGNAL_PREFIXES
@@ -262,11 +262,13 @@ def load_run(folder: Path) -> Trajectory:
     """
     if not is_run_folder(folder):
         raise SceneError(f"{folder}: is no run folder (no manifest.json of this package)")
+    if study := study_in(folder):
+        raise SceneError(f"{folder}: holds a study ({study}), not a run; 'fem-needle report' shows it")
     try:
         values = read_series(folder / SERIES)
         summary = json.loads((folder / SUMMARY).read_bytes())
     except (OSError, ValueError, RecursionError) as error:
-        raise SceneError(f"{folder}: the run is not complete: {_progress(folder) or error}") from None
+        raise SceneError(f"{folder}: the run is not complete: {_progress(folder) or _lost(folder) or error}") from None
     missing = {"time", "arc_length", "deflection", "guide_force", *VARIABLES} - set(values)
     if missing or not isinstance(summary, dict):
         raise SceneError(f"{folder}: the run is not complete: no {', '.join(sorted(missing)) or 'summary'}")
@@ -292,6 +294,11 @@ def _progress(folder: Path) -> str | None:
     if is_locked(folder):
         return "it is being computed"
     return "it was killed, or found no space for its results; the frames that it wrote are there"
+
+
+def _lost(folder: Path) -> str | None:
+    """Return which of a run's files is not there."""
+    return next((f"no {name}" for name in (SERIES, SUMMARY) if not (folder / name).exists()), None)
 
 
 def _check_shapes(folder: Path, values: dict[str, Array]) -> None:

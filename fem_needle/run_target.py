@@ -20,8 +20,13 @@ ANIMATION = "animation.gif"
 _DRAWN = (*(f"{name}.{ending}" for name in PICTURES.values() for ending in ("png", "svg", "pdf")), ANIMATION)
 _PAGES = ("steer.png", "report.html")
 FILES = ("summary.json", "series.nc", *_PAGES, "deflection.pvd", *EXPORTS, *_DRAWN, "scene.toml", "manifest.json")
-STUDIES = ("converge.json", "compare.json", "analyze.json", "benchmark.json", "steer.json", "identify.json")
+STUDIES = ("converge", "compare", "analyze", "benchmark", "steer", "identify")
 FRAMES = (("needle", "*.vtp"), ("tissue", "*.vtu"))
+
+
+def study_in(folder: Path) -> str | None:
+    """Return the name of the study whose files are in a folder, None where there is none."""
+    return next((name for name in STUDIES if (folder / f"{name}.json").exists()), None)
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,7 @@ class RunTarget:
             raise SceneError(f"{self.path}: exists and is no run folder; it is left as it is (name another folder)")
         if not self.force:
             raise SceneError(f"{self.path}: exists already; --force (force=True) replaces what is in it")
-        if not self.for_study and any((self.path / name).exists() for name in STUDIES):
+        if not self.for_study and study_in(self.path):
             raise SceneError(f"{self.path}: holds a study, not a run; it is left as it is (name another folder)")
         if any((self.path / name).is_symlink() for name, _ in FRAMES):
             raise SceneError(f"{self.path}: holds links in place of folders; it is left as it is")

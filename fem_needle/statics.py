@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
+from fem_needle.display import MILLIMETERS, Card, Shown
 from fem_needle.errors import ComputationError
 from fem_needle.loads import LoadCase, load_case
 from fem_needle.plant import Operators, Plant, Points
@@ -18,8 +19,8 @@ ROUNDING = 1e-13  # of the largest element force, by which nearly equal ones may
 FORCE_SUM_TOLERANCE = 1e-6  # of the largest single force: far above round-off, far below a wrong sign
 
 
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibrium(Shown):
     """A needle at rest under the loads of one instant.
 
     Attributes
@@ -49,6 +50,18 @@ class Equilibrium:
     hub_force: float
     hub_moment: float
     tissue_force: float
+
+    def _card(self) -> Card:
+        facts = (
+            ("depth", f"{MILLIMETERS * self.depth:.4g} mm"),
+            ("tip", f"{MILLIMETERS * self.tip_deflection:.4g} mm"),
+            ("hub force", f"{self.hub_force:.4g} N"),
+            ("hub moment", f"{MILLIMETERS * self.hub_moment:.4g} N mm"),
+            ("tissue force", f"{self.tissue_force:.4g} N"),
+            *((f"guide {number}", f"{force:.4g} N") for number, force in enumerate(self.guide_forces)),
+            ("time", f"{self.time:.4g} s"),
+        )
+        return Card("Equilibrium", self.plant.scene.title, facts)
 
     @property
     def tip_deflection(self) -> float:

@@ -11,8 +11,9 @@ from fem_needle.manifest import FILE as MANIFEST
 from fem_needle.manifest import is_run_folder
 from fem_needle.report.parts import Page
 from fem_needle.report.run_page import broken_page, run_page
-from fem_needle.report.study_page import STUDIES, study_page
+from fem_needle.report.study_page import study_page
 from fem_needle.run_folder import SCENE, SERIES, SUMMARY, load_run
+from fem_needle.run_target import study_in
 from fem_needle.scene import Scene
 from fem_needle.scene_file import load_scene
 
@@ -28,7 +29,7 @@ def read_folder(folder: Path) -> Page:
     if not is_run_folder(folder):
         raise SceneError(f"{folder}: is no run folder and no study (no {MANIFEST} of this package)")
     manifest = _json(folder / MANIFEST)
-    name = next((name for name in STUDIES if (folder / f"{name}.json").exists()), None)
+    name = study_in(folder)
     if name is not None:
         return study_page(folder, name, _json(folder / f"{name}.json"), _scene(folder), manifest)
     if not (folder / SERIES).exists():

@@ -7,6 +7,7 @@ import pytest
 import typer
 
 import fem_needle
+import reduced_model
 from fem_needle.cli import build_application
 from fem_needle.scene import Scene
 from fem_needle.series_file import COORDINATES, FIELDS
@@ -94,6 +95,7 @@ def test_the_contract_names_every_command_and_option():
 
 def test_the_contract_names_everything_public():
     assert "run_scene" in dir(fem_needle)
+    assert (fem_needle.__all__, reduced_model.__all__) == (dir(fem_needle), dir(reduced_model))
     assert missing(dir(fem_needle)) == set()
 
 

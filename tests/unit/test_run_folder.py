@@ -186,6 +186,21 @@ def test_a_killed_run_leaves_what_was_computed(tmp_path):
         load_run(tmp_path / "one")
 
 
+@pytest.mark.parametrize("name", ["series.nc", "summary.json"])
+def test_a_run_without_one_of_its_files_names_it(tmp_path, name):
+    folder = run_scene(short_scene()).save(tmp_path / "one")
+    (folder / name).unlink()
+    with pytest.raises(SceneError, match=f"the run is not complete: no {name}"):
+        load_run(folder)
+
+
+def test_a_study_is_no_run_and_says_what_it_is(tmp_path):
+    folder = run_scene(short_scene()).save(tmp_path / "one")
+    (folder / "compare.json").write_text("{}")
+    with pytest.raises(SceneError, match=r"holds a study \(compare\), not a run; 'fem-needle report' shows it"):
+        load_run(folder)
+
+
 def test_an_interrupted_run_is_complete_as_far_as_it_got(tmp_path):
     writer = RunFolderWriter(RunTarget(tmp_path / "one"))
     run = writer.finish(run_scene(short_scene(), observer=Stops(writer, 4, KeyboardInterrupt())))

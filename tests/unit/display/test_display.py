@@ -7,7 +7,17 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from fem_needle import analyze, compare, converge, identify, load_scene, run_scene, simulate_many
+from fem_needle import (
+    FiniteElementNeedle,
+    analyze,
+    compare,
+    converge,
+    identify,
+    load_scene,
+    run_scene,
+    simulate_many,
+    solve_static,
+)
 from fem_needle.benchmark.methods import Setting
 from fem_needle.benchmark.result import Benchmark, CaseInformation, GoalRow, Row
 from fem_needle.closed_loop.repeated import RepeatedLoop, Repetition
@@ -78,6 +88,7 @@ def identification(scene):
 MAKERS = {
     "Scene": lambda scene: scene,
     "Trajectory": lambda scene: run_scene(scene, elements=4),
+    "Equilibrium": lambda scene: solve_static(FiniteElementNeedle(scene, elements=4), depth=0.1),
     "ConvergenceStudy": lambda scene: converge(scene, values=[2, 4]),
     "Comparison": lambda scene: compare(scene, modes=[2], elements=6),
     "Analysis": lambda scene: analyze(scene.with_value("numerics.elements", 4), [0.1]),
@@ -123,6 +134,13 @@ def test_a_run_shows_its_tip(scene):
     rows = dict(row for row in Cells(run._repr_html_()).rows if len(row) == 2)
     assert rows["tip"] == f"{1e3 * run.tip_deflection[-1]:.4g} mm"
     assert rows["relative energy residual"] == f"{run.summary['relative_energy_residual']:.1e}"
+
+
+def test_an_equilibrium_shows_forces_at_rest():
+    rest = solve_static(FiniteElementNeedle(load_scene("brachytherapy"), elements=4), depth=0.05)
+    rows = dict(Cells(rest._repr_html_()).rows)
+    assert rows["depth"] == "50 mm" and rows["tip"] == f"{1e3 * rest.tip_deflection:.4g} mm"
+    assert rows["guide 0"] == f"{rest.guide_forces[0]:.4g} N"
 
 
 def test_a_study_shows_its_rows(scene):
