@@ -23,7 +23,7 @@ from fem_needle.motion import shortest_period
 from fem_needle.run_job import Job, begin, collect, shown, stepper_of, total_error, trajectory_of
 from fem_needle.samples import Sample
 from fem_needle.steppers import DynamicStepper
-from fem_needle.trajectory import Trajectory
+from fem_needle.trajectory import Trajectory, guide_advice
 
 Array = NDArray[np.float64]
 
@@ -349,6 +349,7 @@ def _show(search: _Search) -> Trajectory:
         )
     residual = run.summary["relative_energy_residual"]
     if search.error is not None and residual > search.tolerance:
-        run.summary["warnings"].append(f"the energy balance lacks {residual:.1e} of the largest energy: more than the tolerance")
+        lacking = f"the energy balance lacks {residual:.1e} of the largest energy: more than the tolerance"
+        run.summary["warnings"].append(lacking + guide_advice(job.scene))
     run.summary["step_unknowns"] = sum(other.cost for other in search.trials)
     return shown(job, run, samples)

@@ -235,8 +235,14 @@ def energy_warnings(run: Trajectory) -> list[str]:
         return []
     return [
         f"energies miss by {residual:.2g} of the largest > {ENERGY_BOUND:g}: the time step does not resolve the motion, "
-        "or something snaps; try a smaller time_step"
+        f"or something snaps; try a smaller time_step{guide_advice(run.scene)}"
     ]
+
+
+def guide_advice(scene: Scene) -> str:
+    """Return what calms rigid guides, index-3 constraints, whose forces an undamped integrator may let swing."""
+    is_rigid = any(guide.stiffness == "rigid" for guide in scene.support.guides)
+    return "; spectral_radius = 0.8 calms rigid guides" if is_rigid and scene.numerics.spectral_radius == 1.0 else ""
 
 
 def summary_of(run: Trajectory) -> dict[str, Any]:

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from fem_needle import ComputationError, FiniteElementNeedle, load_scene, run_scene, simulate
+from fem_needle import ComputationError, FiniteElementNeedle, load_scene, run_scene, simulate, trajectory
 from fem_needle.legs import equilibria
 from fem_needle.march import TimeGrid, output_times, time_grid
-from fem_needle.scene import Sinusoid, TipLoad
+from fem_needle.scene import Friction, Guide, Insertion, Sinusoid, TipLoad
 from fem_needle.steppers import StaticStepper
 from tests.consistency.scenes import GEL, LAYERS, held, moving, profile, scene_of
 
@@ -142,6 +142,15 @@ def test_settings_of_run_scene_override_those_of_the_scene():
     assert run.scene.numerics.elements == 5
 
 
+def test_progress_is_complete_where_a_run_ends_before_its_time():
+    watcher = Watcher()
+    push = Insertion(kind="force", initial_depth=0.04, final_depth=0.05, push_force=1.0)
+    scene = scene_of("entry", push, GEL, friction=Friction(viscous=10.0), duration=1.0)
+    run = simulate(plant(scene), time_step=1e-3, analysis="quasi-static", output_step=0.01, observer=watcher)
+    assert run.summary["stop_reason"] == "final-depth" and run.time[-1] < 0.9
+    assert watcher.fractions[-2] < 0.9 and watcher.fractions[-1] == 1.0
+
+
 def test_final_depth_is_the_reason_where_the_scene_ends_by_itself():
     scene = scene_of("entry", moving(0.5, 0.04, 0.05), duration=None)
     assert simulate(plant(scene), time_step=1e-3, analysis="static").summary["stop_reason"] == "final-depth"
@@ -162,6 +171,19 @@ def test_elements_that_miss_the_tolerance_are_told(modulus, is_missed):
     run = run_scene(scene, elements=2, analysis="static", output_step=0.4)
     assert (run.summary["error_estimate"] > 1e-3) is is_missed
     assert (run.summary["warnings"] == ["the tolerance 0.001 was not reached with elements = 2: see error_estimate"]) is is_missed
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "radius", "is_advised"), [("rigid", 1.0, True), ("rigid", 0.8, False), (500.0, 1.0, False)]
+)
+def test_energies_that_miss_under_rigid_guides_advise_damping(stiffness, radius, is_advised):
+    support = {"guides": [Guide(position=-0.01, stiffness=stiffness)]}
+    scene = scene_of("hub", held(0.1), GEL, support=support, numerics={"spectral_radius": radius}, duration=0.01)
+    run = simulate(plant(scene), time_step=1e-3, analysis="dynamic", output_step=1e-3)
+    assert trajectory.energy_warnings(run) == []
+    run.series["energy_residual"] = run.energy_residual + run.bending_energy
+    (warning,) = trajectory.energy_warnings(run)
+    assert ("spectral_radius = 0.8 calms rigid guides" in warning) is is_advised
 
 
 def test_reversal_holds_and_reinsertion():
