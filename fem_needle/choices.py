@@ -13,17 +13,20 @@ from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
 from fem_needle.inertia_effect import POINTS_PER_PERIOD, inertia_effect
 from fem_needle.limits import check_samples
+from fem_needle.loads import load_cases
 from fem_needle.modal_stepper import needs_no_steps, vibrating_tips
-from fem_needle.motion import PUSH_SLACK, depth_law, run_duration, shortest_period
+from fem_needle.motion import PUSH_SLACK, depth_law, lateral_values, run_duration, shortest_period
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import run_limits
-from fem_needle.scene import Scene
+from fem_needle.scene import Scene, as_function
 from fem_needle.skipping import INERTIA_SHARE, Skipped, unneeded_terms
 from fem_needle.statics import solve_static
 
 Array = NDArray[np.float64]
 
 PILOT_INSTANTS = 7
+DRAWN = 50  # times of each part of a run, among which loads are looked for
+LARGER = 1.25
 SLOW_PERIODS = 10  # longest natural periods: loads that swing faster are taken to make the needle vibrate
 HISTORY_POINTS = (400, 2000)  # fewest and most instants at which vibrations of two plants are compared: the outputs else
 OUTPUTS = 200
@@ -136,10 +139,31 @@ def static_tips(plant: Plant, count: int = PILOT_INSTANTS) -> Array:
     return np.array([solve_static(plant, depth=depth, time=time).tip_deflection for time, depth in instants(plant, count)])
 
 
+def loaded_times(scene: Scene, duration: float, count: int) -> list[float]:
+    """Return times [s] spread over a run: of each of so many equal parts the middle, or where loads and hub act most.
+
+    A load that swings vanishes again and again, and may do so at all of any equal times: a model that is looked at there alone
+    seems exact. Other times of a part are drawn, always the same ones, and are taken where loads are larger by `LARGER`.
+    """
+    even = np.linspace(0.0, duration, count)
+    half, random = 0.5 * duration / (count - 1), np.random.default_rng(0)
+    marks = np.array([time for value in lateral_values(scene) for time in as_function(value).breakpoints])
+    drawn = np.concatenate([even, random.uniform(0.0, duration, DRAWN * count), marks[(marks >= 0.0) & (marks <= duration)]])
+    case = load_cases(scene, np.full_like(drawn, scene.insertion.first_depth), drawn)
+    values = np.abs(np.hstack([case.forces, case.clamp]))
+    acting = np.sum(values / np.maximum(np.max(values, axis=0), np.finfo(float).tiny), axis=1)
+    times = []
+    for place, time in enumerate(even.tolist()):
+        part = np.flatnonzero(np.abs(drawn - time) <= half)
+        most = part[int(np.argmax(acting[part]))]
+        times.append(float(drawn[most]) if acting[most] > LARGER * acting[place] else time)
+    return times
+
+
 def instants(plant: Plant, count: int = PILOT_INSTANTS) -> list[tuple[float, float]]:
-    """Return (time, depth) spread over the run; what is hardly inserted yet is left out."""
+    """Return (time, depth) spread over the run, where loads act; what is hardly inserted yet is left out."""
     scene, law = plant.scene, depth_law(plant.scene)
-    times = np.linspace(0.0, run_duration(scene), count).tolist()
+    times = loaded_times(scene, run_duration(scene), count)
     found = [(time, law.depth(time)) for time in times]
     if scene.insertion.kind == "force":  # the depths over time are not known yet: spread them
         last = scene.insertion.final_depth or run_limits(scene).contact

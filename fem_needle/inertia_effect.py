@@ -4,8 +4,9 @@ With q_0(t) of the pilot, the inertia that it lacks is a force,
 
     f = -d/dt (M q_0' + v S q_0) + v S' q_0' + v^2 R q_0,
 
-and at every kink a jump of the momentum M q_0' + v S q_0, which strikes the needle. Derivation: docs/theory.md, "What may be left
-out".
+and at every kink a jump of the momentum M q_0' + v S q_0, which strikes the needle. Where a load jumps (the bevel law at an
+interface, a ramp that takes no time) q_0 itself jumps: the needle is let go there. Derivation: docs/theory.md, "What may be
+left out".
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from scipy.linalg import eigh
 from fem_needle import banded
 from fem_needle.free_response import ROUNDING, frozen_matrices, ringing
 from fem_needle.limits import check_swings
+from fem_needle.loads import load_case
 from fem_needle.march import TimeGrid, march
 from fem_needle.motion import DepthLaw, depth_law, landing_times, run_duration, shortest_period
 from fem_needle.plant import Operators, Plant
@@ -33,6 +35,8 @@ PILOT_POINTS = 200  # instants of the pilot
 POINTS_PER_PERIOD = 24
 SLIVER = 1e-6  # of the run: kinks nearer to each other are one
 FEWEST_SAMPLES = 5  # of a smooth piece
+BESIDE = 1e-9  # of the length: before and behind an interface
+SAME = 1e-6  # of a force: less is no jump
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +65,9 @@ class _Piece:
 def inertia_effect(plant: Plant) -> float:
     """Return a bound on how far inertia moves the tip, relative to the largest tip deflection.
 
-    2 max |tip of K^-1 f| plus, for each jump of the momentum (at the start, at kinks), the largest tip deflection of the free
-    vibration that it starts, as it grows while the needle moves on. It assumes loads slower than the lowest natural frequency;
-    where they are not, the first term is of order one by itself.
+    2 max |tip of K^-1 f| plus, for each jump of the momentum (at the start, at kinks) and of the equilibrium, the largest tip
+    deflection of the free vibration that it starts, as it grows while the needle moves on. It assumes loads slower than the
+    lowest natural frequency; where they are not, the first term is of order one by itself.
     """
     scene = plant.scene
     if scene.initial.shape != "equilibrium":
@@ -75,6 +79,8 @@ def inertia_effect(plant: Plant) -> float:
     jumps = [pieces[0].momentum(0) - _starting_momentum(plant, pieces[0], law)]
     jumps += [right.momentum(0) - left.momentum(-1) for left, right in pairwise(pieces)]
     vibration = sum(_struck(pieces[number:], jump) for number, jump in enumerate(jumps))
+    landings = landing_times(scene, law, run_duration(scene), plant.smallest_depth)
+    vibration += sum(_struck(pieces[number:], _let_go(piece, law, landings)) for number, piece in enumerate(pieces))
     return (2.0 * forced + vibration) / largest
 
 
@@ -168,6 +174,35 @@ def _struck(pieces: list[_Piece], jump: Array) -> float:
         swing = momenta[:count] * reached[:count] / np.sqrt(frequencies[:count] * later[:count])
         swings.append(float(np.sum(swing)))
     return rung * max(swings) / swings[0]
+
+
+def _let_go(piece: _Piece, law: DepthLaw, landings: tuple[float, ...]) -> Array:
+    """Return the momentum that strikes vibrations as far as a jump of the equilibrium at the start of a piece lets them go."""
+    plant, first, shift = piece.plant, float(piece.times[0]), _shift(piece, law, landings)
+    struck = np.zeros(plant.size)
+    if np.any(shift):
+        mass, _, stiffness, basis = frozen_matrices(plant, float(piece.depths[0]), first)
+        squares, vectors = eigh(stiffness, mass)
+        away = vectors.T @ (basis @ banded.multiply(piece.operators(0).mass, shift)[plant.prescribed :])
+        momenta = mass @ vectors @ (np.sqrt(np.maximum(squares, squares[-1] * ROUNDING)) * away)
+        struck[plant.prescribed :] = np.linalg.pinv(basis) @ momenta
+    return struck
+
+
+def _shift(piece: _Piece, law: DepthLaw, landings: tuple[float, ...]) -> Array:
+    """Return how far the equilibrium jumps at the start of a piece, over all kinks that are one there; zeros without a jump."""
+    plant, first = piece.plant, float(piece.times[0])
+    scene = plant.scene
+    last = max((time for time in landings if first <= time <= first + SLIVER * run_duration(scene)), default=first)
+    beside, after = BESIDE * scene.needle.length, law.after(last)
+    behind = np.sign(law.before(first).speed) * beside if first > 0.0 else 0.0
+    sides = ((first, law.depth(first) - behind), (last, after.depth + np.sign(after.speed) * beside))
+    places = [(time, float(np.clip(depth, plant.smallest_depth, scene.needle.length))) for time, depth in sides]
+    forces, later = (load_case(scene, depth, time).forces for time, depth in places)
+    if first == last and np.allclose(forces, later, rtol=SAME, atol=0.0):
+        return np.zeros(plant.size)
+    left, right = (solve_static(plant, depth=depth, time=time).coordinates for time, depth in places)
+    return right - left
 
 
 def _vibrations(plant: Plant, depth: float, time: float, jump: Array) -> tuple[Array, Array, Array]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fem_needle.loads import second_derivative
 from fem_needle.rigid_push import time_to_depth
-from fem_needle.scene import LateralLoad, Scene, Sinusoid, Table, TimeFunction, TipLoad, as_function
+from fem_needle.scene import Scene, Sinusoid, Table, TimeFunction, TipLoad, as_function
 from fem_needle.segments import interfaces
 
 Array = NDArray[np.float64]
@@ -172,26 +172,27 @@ def run_duration(scene: Scene) -> float:
     return float(scene.insertion.end_time or 0.0)
 
 
+def lateral_values(scene: Scene) -> list[float | Table | Sinusoid]:
+    """Return what moves the needle sideways and may vary in time: the hub, the tissue's swelling, forces and their directions."""
+    support, loads = scene.support, scene.loads
+    values = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
+    values += [load.force for load in loads if load.force is not None]
+    return values + [load.direction for load in loads if isinstance(load, TipLoad)]
+
+
 def shortest_period(scene: Scene) -> float:
     """Return the shortest period [s] of any sinusoid of the scene, infinity without one."""
     insertion = scene.insertion
-    support = scene.support
-    sources = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
-    sources += [value for value in (insertion.speed, insertion.depth, insertion.push_force) if value is not None]
-    sources += [load.force for load in scene.loads if load.force is not None]
-    sources += [load.direction for load in scene.loads if isinstance(load, TipLoad)]
+    sources = [value for value in (insertion.speed, insertion.depth, insertion.push_force) if value is not None]
+    sources += lateral_values(scene)
     rates = [abs(source.frequency) for source in sources if isinstance(source, Sinusoid)]
     return 1.0 / max(rates) if rates and max(rates) > 0 else float("inf")
 
 
 def landing_times(scene: Scene, law: DepthLaw, duration: float, smallest_depth: float) -> tuple[float, ...]:
     """Return every time in (0, duration) on which a step must land: kinks of motion, loads and layers."""
-    support = scene.support
-    sources = [support.hub_deflection, support.hub_angle, support.hub_torque, scene.tissue.stiffness_factor]
+    sources = lateral_values(scene)
     sources += [] if scene.insertion.push_force is None else [scene.insertion.push_force]
-    sources += [load.force for load in scene.loads if isinstance(load, LateralLoad)]
-    tips = [load for load in scene.loads if isinstance(load, TipLoad)]
-    sources += [load.direction for load in tips] + [load.force for load in tips if load.force is not None]
     times = set(law.kinks(duration))
     for source in sources:
         times |= {time for time in as_function(source).breakpoints if 0 < time < duration}

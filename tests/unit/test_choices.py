@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from fem_needle import FiniteElementNeedle, SceneError, run_scene, solve_static
-from fem_needle.choices import choose, first_time_step, tip_difference
+from fem_needle.choices import choose, first_time_step, loaded_times, tip_difference
 from fem_needle.exact import exact_static, natural_frequencies
 from fem_needle.finite_element_model import FAMILY
-from fem_needle.scene import Layer, Sinusoid, TipLoad
+from fem_needle.scene import Layer, Sinusoid, Table, TipLoad
 from tests.consistency.scenes import GEL, characteristic_modulus, held, moving, scene_of
 
 
@@ -31,6 +31,25 @@ def test_more_accuracy_needs_more_elements():
     scenes = [scene_of("hub", held(0.1), layers, numerics={"tolerance": tolerance}) for tolerance in (1e-2, 1e-4, 1e-6)]
     counts = [FAMILY.choose(scene, "static").plant.mesh.elements for scene in scenes]
     assert counts == sorted(set(counts))
+
+
+FORCES = {
+    "vanishes at all equal times": Sinusoid(amplitude=0.1, frequency=1.0),
+    "acts between equal times": Table(time=[0.0, 5.55, 5.9, 6.3, 11.0], value=[0.0, 0.0, 0.1, 0.0, 0.0]),
+    "constant": 0.1,
+}
+
+
+@pytest.mark.parametrize("force", FORCES.values(), ids=FORCES)
+def test_models_are_judged_where_loads_act(force):
+    layers = (Layer(foundation_modulus=5e4),)
+    scene = scene_of("hub", held(0.15), layers, [TipLoad(force=force)], duration=11.0)
+    plant = FiniteElementNeedle(scene, elements=2)
+    error = abs(solve_static(plant, depth=0.15, time=5.9).tip_deflection / exact_static(scene, 0.15, 5.9).tip_deflection - 1.0)
+    for count in (7, 12):
+        assert tip_difference(scene, plant, FiniteElementNeedle(scene, elements=64)) == pytest.approx(error, rel=1e-2)
+        assert (loaded_times(scene, 11.0, count) == np.linspace(0.0, 11.0, count).tolist()) is (force == 0.1)
+    assert FAMILY.choose(scene, "quasi-static").plant.mesh.elements > 4
 
 
 def test_mesh_error_is_that_of_the_tip():

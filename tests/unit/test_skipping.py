@@ -9,7 +9,7 @@ from fem_needle.free_response import ringing
 from fem_needle.inertia_effect import inertia_effect
 from fem_needle.legs import march as leg_loop
 from fem_needle.motion import shortest_period
-from fem_needle.scene import Guide, Initial, Insertion, Layer, Model, Sinusoid, TipLoad
+from fem_needle.scene import Guide, Initial, Insertion, Layer, Model, Sinusoid, Table, TipLoad
 from fem_needle.skipping import RULES, inertia_free_stepper, unneeded_terms
 from fem_needle.steppers import DynamicStepper, StaticStepper
 from tests.consistency.scenes import BUZZ, DAMPED, GEL, held, moving, profile, relative, scene_of
@@ -71,6 +71,27 @@ def test_the_bound_covers_what_inertia_does(speed):
     bound = inertia_effect(plant)
     assert effect <= bound
     assert bound < 100.0 * effect
+
+
+@pytest.mark.parametrize("kind", ["entry", "hub"])
+def test_the_bound_covers_what_a_jump_of_the_bevel_force_sets_ringing(kind):
+    """The equilibrium jumps at the interface; however slow the needle, it is let go there."""
+    layers = (Layer(end=0.1, foundation_modulus=5e3), Layer(start=0.1, foundation_modulus=2e4))
+    scene = scene_of(kind, moving(0.1, 0.099, 0.101), layers, [TipLoad(bevel_coefficient=5e-6)], duration=None)
+    plant = FiniteElementNeedle(scene, elements=6)
+    both = [simulate(plant, analysis=name, time_step=2e-5, output_step=1e-4) for name in ("dynamic", "static")]
+    effect = relative(both[0].tip_deflection, both[1].tip_deflection)
+    assert 0.1 < effect <= inertia_effect(plant)
+    slow = scene.with_value("insertion.speed", 1e-6)
+    assert effect <= inertia_effect(FiniteElementNeedle(slow, elements=6)) < 2.0 * effect
+
+
+def test_a_ramp_that_takes_no_time_sets_it_ringing():
+    force = Table(time=[0.0, 500.0, 500.0001], value=[0.0, 0.0, 0.1])
+    scene = scene_of("entry", held(0.1), GEL, [TipLoad(force=force)], duration=1000.0)
+    assert inertia_effect(FiniteElementNeedle(scene, elements=4)) == pytest.approx(1.0, abs=0.05)
+    viscous = scene.with_value("tissue.layers.0.damping", 5e4)
+    assert inertia_effect(FiniteElementNeedle(viscous, elements=4)) < 0.1
 
 
 @pytest.mark.parametrize("kind", ["entry", "hub"])
