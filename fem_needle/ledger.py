@@ -81,7 +81,11 @@ def energies(stage: Stage, solution: StageSolution, *, inertia: bool) -> Energie
 def potential_energies(stage: Stage, coordinates: Array, forces: Array) -> tuple[float, float, float]:
     """Return bending energy, tissue energy (guides' springs included) and the guides' part [J]."""
     operators, points = stage.operators, stage.points
-    bending = form(operators.bending, coordinates, coordinates) + float(forces @ points.flexibility @ forces)
+    kinks = float(forces @ points.flexibility @ forces)
+    if operators.beam is None:
+        bending = form(operators.bending, coordinates, coordinates) + kinks
+    else:
+        bending = float(operators.beam.bending_forms(coordinates[:, None])[0]) + kinks
     reactions = forces[: points.guides]
     guide = 0.5 * float(reactions @ (points.guide_compliance * reactions))
     tissue = 0.5 * form(operators.tissue, coordinates, coordinates)

@@ -45,6 +45,9 @@ class FlexibleBeam(Protocol):
     def factorize(self, tissue: Array, clamped: int) -> StiffnessFactorization:
         """Factor bending plus a tissue matrix (band storage), the first ``clamped`` coordinates held."""
 
+    def bending_forms(self, columns: Array) -> Array:
+        """Return q.K q (m,) of the bending alone for columns of coordinates (size, m)."""
+
 
 @dataclass(frozen=True, eq=False)
 class SupportedFactorization:

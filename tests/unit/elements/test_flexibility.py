@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fem_needle import SuspiciousValueWarning, load_scene, run_scene
-from fem_needle.exact import exact_static
+from fem_needle.exact import ReleaseFromTipForce, exact_static
 from fem_needle.needle import FiniteElementNeedle
 from fem_needle.scene import Guide, LateralLoad
 from fem_needle.statics import solve_static
@@ -65,6 +65,23 @@ def test_flexibility_and_stiffness_are_the_same_equations(name, degree):
     expected, expected_support = stiff.stiffness_factorization.solve_supported(right)
     assert answers == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.max(np.abs(expected)))
     assert support == pytest.approx(expected_support, rel=1e-7, abs=1e-7 * np.max(np.abs(expected_support)))
+
+
+@pytest.mark.parametrize("elements", [40, 10_000])
+def test_the_bending_energy_keeps_its_digits(elements):
+    """At rest the energies are half the work of the load: w F / 2."""
+    scene = load_scene("bench-s").with_value("numerics.loop", "numpy")
+    run = run_scene(scene, elements=elements, output_step=1.0)
+    energy = run.bending_energy[0] + run.tissue_energy[0]
+    assert energy == pytest.approx(0.5 * 0.1 * run.tip_deflection[0], rel=1e-9)
+
+
+def test_a_held_vibration_keeps_its_phase_on_a_fine_mesh():
+    """300 elements, no power of two: the entries of K are rounded; a thousand radians would show 1e-4 of it."""
+    scene = load_scene("bench-d").with_values({"run.duration": 1.0, "numerics.output_step": 0.01})
+    run = run_scene(scene, elements=300)
+    exact = ReleaseFromTipForce(scene).tip_deflection(run.time)
+    assert np.max(np.abs(run.tip_deflection - exact)) / np.max(np.abs(exact)) < 1e-6
 
 
 def test_time_steps_on_a_fine_mesh_warn():
