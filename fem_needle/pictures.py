@@ -15,6 +15,8 @@ INK = "#303030"
 # Okabe and Ito, in the order of use: blue, vermilion, bluish green, reddish purple, orange, sky blue.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES: Any = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)), (0, (3, 3)), (0, (8, 2)))
+# Of the layers of tissue, behind dark lines and letters.
+SHADES = ("#f4e3d2", "#e3bfa6", "#eddcb4", "#d9c3c8", "#f1d5c4", "#dcc9a9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 STYLE: Any = {
     "font.size": 10.0,

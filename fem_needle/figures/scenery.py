@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 OUTSIDE_SHARE = 0.12  # of the depth that is shown before the skin where nothing bends there
 SPACE = 0.04  # of the visible length, at both ends
 WANTED, PATH = COLORS[3], COLORS[1]
+RIGID, ON_A_SPRING = "rigid guide", "guide on a spring"
+GUIDES = {RIGID: ("D", "white"), ON_A_SPRING: ("p", COLORS[5])}  # marker and color
 
 
 def set_limits(axes: Axes, run: Trajectory, rows: NDArray[np.intp]) -> None:
@@ -46,9 +48,8 @@ def draw_scenery(axes: Axes, strip: Axes, run: Trajectory, width: float) -> None
     scene = run.scene
     draw_tissue(axes, strip, scene, width)
     axes.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (6, 4)), zorder=1)
-    for number, guide in enumerate(scene.support.guides):
-        kind = "rigid guide" if guide.stiffness == "rigid" else "guide on a spring"
-        axes.plot([MILLIMETERS * guide.position], [0.0], **_point("D", "white"), label="_" * bool(number) + kind)
+    for kind, (places, style) in guides_of(run).items():
+        axes.plot(places, np.zeros(len(places)), **_point(*style), label=kind)
     if scene.support.kind == "entry":
         axes.plot([0.0], [0.0], **_point("s", COLORS[4]), label="clamp at the skin")
     if len(run.path_position):
@@ -56,6 +57,15 @@ def draw_scenery(axes: Axes, strip: Axes, run: Trajectory, width: float) -> None
         axes.plot(MILLIMETERS * run.path_position, MILLIMETERS * run.path_deflection, label="path that the tip cut", **style)
     draw_target(axes, run)
     axes.set(xlabel="place along the insertion axis y [mm], 0 at the skin", ylabel="deflection [mm]")
+
+
+def guides_of(run: Trajectory) -> dict[str, tuple[list[float], tuple[str, str]]]:
+    """Return the guides by kind: their places [mm], marker and color of the kind."""
+    found: dict[str, tuple[list[float], tuple[str, str]]] = {}
+    for guide in run.scene.support.guides:
+        kind = RIGID if guide.stiffness == "rigid" else ON_A_SPRING
+        found.setdefault(kind, ([], GUIDES[kind]))[0].append(MILLIMETERS * guide.position)
+    return found
 
 
 def draw_target(axes: Axes, run: Trajectory) -> None:

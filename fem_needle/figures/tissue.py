@@ -9,15 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_needle.figures.common import MILLIMETERS, SMALL
-from fem_needle.pictures import INK
+from fem_needle.layer_names import key_entry, layer_key, layer_text, numbered_layers
+from fem_needle.pictures import INK, SHADES
 from fem_needle.scene import Layer, Scene
 
-SHADES = ("#f4e3d2", "#e3bfa6", "#eddcb4", "#d9c3c8", "#f1d5c4", "#dcc9a9")
 STRIP_SHARE = 0.17  # height of the strip over that of the picture below it
 CHARACTER = 0.56  # width of a letter over its height
 MOST_LINES = 3
-NO_BREAK = "\u00a0"
-MOST_NOTES = 8  # layers that are named below the picture
 NOTE_WIDTH = 115  # characters of a line below the picture
 
 
@@ -29,30 +27,36 @@ class Band:
     ----------
     start, end
         y of its visible ends.
+    number
+        Of the layer in the scene.
     text
         Name and modulus.
+    note
+        Number, name and modulus, for the key of a picture that shows the number alone.
     shade
         Its color.
     """
 
     start: float
     end: float
+    number: int
     text: str
+    note: str
     shade: str
 
 
 def bands_of(scene: Scene, low: float, high: float) -> tuple[Band, ...]:
     """Return the layers that are seen between two places [mm], by place."""
-    layers = sorted(scene.tissue.layers, key=lambda layer: layer.start)
-    found = (_band(layer, index, low, high) for index, layer in enumerate(layers))
+    found = (
+        _band(layer, number, SHADES[place % len(SHADES)], (low, high))
+        for place, (number, layer) in enumerate(numbered_layers(scene))
+    )
     return tuple(band for band in found if band.end > band.start)
 
 
-def _band(layer: Layer, index: int, low: float, high: float) -> Band:
-    start, end = max(MILLIMETERS * layer.start, low), min(MILLIMETERS * layer.far_side, high)
-    name = layer.name or f"layer {index}"
-    text = f"{name}, {layer.foundation_modulus / 1e3:.4g}{NO_BREAK}kN/m²"
-    return Band(start, end, text, SHADES[index % len(SHADES)])
+def _band(layer: Layer, number: int, shade: str, seen: tuple[float, float]) -> Band:
+    start, end = max(MILLIMETERS * layer.start, seen[0]), min(MILLIMETERS * layer.far_side, seen[1])
+    return Band(start, end, number, layer_text(number, layer), key_entry(number, layer), shade)
 
 
 def figure_with_tissue(figure: Figure) -> tuple[Axes, Axes]:
@@ -79,15 +83,15 @@ def draw_tissue(axes: Axes, strip: Axes, scene: Scene, width: float) -> None:
     """
     low, high = axes.get_xlim()
     bands, notes = bands_of(scene, low, high), []
-    for number, band in enumerate(bands, start=1):
+    for band in bands:
         for panel in (axes, strip):
             panel.axvspan(band.start, band.end, color=band.shade, linewidth=0.0, zorder=0)
         room = width * (band.end - band.start) / (high - low)
         lines = wrap(band.text, max(int(room / (CHARACTER * SMALL)), 1), break_long_words=False)
         fits = len(lines) <= MOST_LINES and max(map(len, lines)) * CHARACTER * SMALL <= room
-        text = "\n".join(lines) if fits else str(number)
+        text = "\n".join(lines) if fits else str(band.number)
         if not fits:
-            notes.append(f"{number}: {band.text}")
+            notes.append(band.note)
         if fits or len(text) * CHARACTER * SMALL + 2.0 <= room:
             place = ((band.start + band.end) / 2.0, 0.5)
             strip.annotate(text, place, ha="center", va="center", fontsize=SMALL, parse_math=False)
@@ -105,11 +109,6 @@ def draw_tissue(axes: Axes, strip: Axes, scene: Scene, width: float) -> None:
 
 def _write_notes(axes: Axes, notes: list[str]) -> None:
     """Name below the picture the layers that are too thin for their names."""
-    if not notes:
-        return
-    left_out = len(notes) - MOST_NOTES
-    shown = [*notes[:MOST_NOTES], *([f"and {left_out} more thin layers"] if left_out > 0 else [])]
     figure = axes.get_figure(root=True)
-    if figure is not None:
-        text = "\n".join(wrap("Layers: " + ";  ".join(shown), NOTE_WIDTH))
-        figure.supxlabel(text, x=0.01, ha="left", fontsize=SMALL, parse_math=False)
+    if notes and figure is not None:
+        figure.supxlabel(layer_key(notes, NOTE_WIDTH), x=0.01, ha="left", fontsize=SMALL, parse_math=False)

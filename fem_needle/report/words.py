@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from fem_needle.closed_loop.steering import described
+from fem_needle.layer_names import layer_name, numbered_layers
 from fem_needle.report.numbers import KILO, millimeters, modulus, number, quantity, ratio, varying, with_unit
 from fem_needle.report.parts import Grid
 from fem_needle.scene import Guide, LateralLoad, Scene, TipLoad
@@ -35,11 +36,12 @@ def scene_words(scene: Scene) -> tuple[tuple[str, str], ...]:
 
 def layer_grids(scene: Scene) -> tuple[Grid, ...]:
     """Return the table of the layers, by depth; none without layers."""
-    layers = sorted(scene.tissue.layers, key=lambda layer: layer.start)
+    numbered = numbered_layers(scene)
+    layers = [layer for _, layer in numbered]
     if not layers:
         return ()
     columns = {
-        "layer": [layer.name or f"layer {index}" for index, layer in enumerate(layers)],
+        "layer": [layer_name(number, layer) for number, layer in numbered],
         "from": [millimeters(layer.start) for layer in layers],
         "to": ["no far side" if layer.end is None else millimeters(layer.end) for layer in layers],
         "foundation modulus": [modulus(layer.foundation_modulus) for layer in layers],

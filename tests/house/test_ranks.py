@@ -39,6 +39,7 @@ RANKS = {
     "exact": 2,
     "manifest": 2,
     "tissue_block": 2,
+    "layer_names": 2,
     "plant": 2,
     "models": 3,
     # parts of a model, and what needs only the protocol

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from matplotlib.text import Text
 
 from fem_needle import SceneError, Trajectory
 from fem_needle.figures import courses, energies, shapes, tip_path, waterfall
+from fem_needle.figures.tissue import bands_of
 from tests.unit.figures.runs import run_named
 
 SIZES = {"J": 1.0, "mJ": 1e-3, "µJ": 1e-6, "nJ": 1e-9, "pJ": 1e-12, "N": 1.0, "mN": 1e-3, "µN": 1e-6, "mm": 1e-3}
@@ -76,6 +78,24 @@ def test_guide_hub_target_force_and_cut_path_are_drawn():
     run = run_named("cut path")
     cut = lines(shapes(run).axes[1])["path that the tip cut"]
     np.testing.assert_allclose(cut.get_ydata(), 1e3 * run.path_deflection)
+
+
+def test_two_kinds_of_guides_have_two_markers_and_two_names():
+    guides = [{"position": -0.01}, {"position": -0.02, "stiffness": 300.0}, {"position": -0.03}]
+    run = run_named("hub")
+    drawn = lines(shapes(replace(run, scene=run.scene.with_values({"support.guides": guides}))).axes[1])
+    rigid, spring = drawn["rigid guide"], drawn["guide on a spring"]
+    assert (rigid.get_xdata().tolist(), spring.get_xdata().tolist()) == ([-10.0, -30.0], [-20.0])
+    assert rigid.get_marker() != spring.get_marker() and rigid.get_color() != spring.get_color()
+
+
+def test_layers_without_names_have_their_numbers_in_the_scene():
+    """Layers may stand in any order; ``tissue.layers.N`` counts them from 0."""
+    layers = [{"start": 0.05, "foundation_modulus": 2e4}, {"end": 0.05, "foundation_modulus": 5e3}]
+    scene = run_named("hub").scene.with_values({"tissue.layers": layers})
+    bands = bands_of(scene, 0.0, 100.0)
+    found = [(band.start, *(text.replace("\u00a0", " ") for text in (band.text, band.note))) for band in bands]
+    assert found == [(0.0, "layer 1, 5 kN/m²", "1: 5 kN/m²"), (50.0, "layer 0, 20 kN/m²", "0: 20 kN/m²")]
 
 
 def test_the_path_of_the_tip_is_its_deflection_over_its_place():

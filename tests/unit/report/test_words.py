@@ -144,7 +144,7 @@ def test_columns_of_layers_without_a_value_are_left_out():
     assert grid.headers == ("layer", "from", "to", "foundation modulus", "cutting force")
     assert [tuple(map(plain, row)) for row in grid.rows] == [
         ("fat", "0 mm", "50 mm", "5 kN/m²", "0 N"),
-        ("layer 1", "50 mm", "no far side", "20 kN/m²", "0.9 N"),
+        ("layer 0", "50 mm", "no far side", "20 kN/m²", "0.9 N"),
     ]
 
 
