@@ -48,8 +48,8 @@ def draw_scenery(axes: Axes, strip: Axes, run: Trajectory, width: float) -> None
     scene = run.scene
     draw_tissue(axes, strip, scene, width)
     axes.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (6, 4)), zorder=1)
-    for kind, (places, style) in guides_of(run).items():
-        axes.plot(places, np.zeros(len(places)), **_point(*style), label=kind)
+    for kind, places in guides_of(run).items():
+        axes.plot(places, np.zeros(len(places)), **_point(*GUIDES[kind]), label=kind)
     if scene.support.kind == "entry":
         axes.plot([0.0], [0.0], **_point("s", COLORS[4]), label="clamp at the skin")
     if len(run.path_position):
@@ -59,12 +59,12 @@ def draw_scenery(axes: Axes, strip: Axes, run: Trajectory, width: float) -> None
     axes.set(xlabel="place along the insertion axis y [mm], 0 at the skin", ylabel="deflection [mm]")
 
 
-def guides_of(run: Trajectory) -> dict[str, tuple[list[float], tuple[str, str]]]:
-    """Return the guides by kind: their places [mm], marker and color of the kind."""
-    found: dict[str, tuple[list[float], tuple[str, str]]] = {}
+def guides_of(run: Trajectory) -> dict[str, list[float]]:
+    """Return the places of the guides [mm] by kind, of `GUIDES`."""
+    found: dict[str, list[float]] = {}
     for guide in run.scene.support.guides:
         kind = RIGID if guide.stiffness == "rigid" else ON_A_SPRING
-        found.setdefault(kind, ([], GUIDES[kind]))[0].append(MILLIMETERS * guide.position)
+        found.setdefault(kind, []).append(MILLIMETERS * guide.position)
     return found
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.errors import SceneError
+from fem_needle.layer_names import key_entry, layer_text, numbered_layers
 from fem_needle.run_forces import Forces, lateral_forces, support_forces, tip_force
 from fem_needle.scene import Scene
 from fem_needle.tissue_block import layer_extent
@@ -25,16 +26,28 @@ STATIONS = 81
 NOTHING = 1e-6  # of the largest force: a smaller one has no arrow
 ARROW_RADIUS = 1 / 320  # of the needle's length
 INVISIBLE = 1e-9  # mm
-PLATE = 1 / 12  # of the needle's length: radius of a guide's plate
+PLATE, SPRING_PLATE = 1 / 12, 1 / 20  # of the needle's length: radius of the plate of a guide that is rigid, on a spring
 
 
 @dataclass(frozen=True)
 class Slab:
-    """A layer as a block: from, to [mm], and what to write on it."""
+    """A layer as a block.
+
+    Attributes
+    ----------
+    start, end
+        Along the insertion axis [mm].
+    number
+        In the scene.
+    label, note
+        What to write on it, and what a key says where there is no room.
+    """
 
     start: float
     end: float
+    number: int
     label: str
+    note: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +117,18 @@ class Arrangement:
         return f"deflections {self.magnification:g} times as large{arrows}{thickness}"
 
     @property
-    def template(self) -> Surface:
-        """The guides as plates with a hole."""
-        hole = 2.0 * self.radius
-        places = (MILLI * guide.position for guide in self.scene.support.guides)
-        return together(plate(place, hole, PLATE * self.length) for place in places)
+    def rigid_guides(self) -> Surface:
+        """The rigid guides as plates with a hole."""
+        return self._plates(PLATE, rigid=True)
+
+    @property
+    def spring_guides(self) -> Surface:
+        """The guides on springs as smaller plates with a hole."""
+        return self._plates(SPRING_PLATE, rigid=False)
+
+    def _plates(self, size: float, *, rigid: bool) -> Surface:
+        guides = (guide for guide in self.scene.support.guides if (guide.stiffness == "rigid") is rigid)
+        return together(plate(MILLI * guide.position, 2.0 * self.radius, size * self.length) for guide in guides)
 
     @property
     def radius(self) -> float:
@@ -220,11 +240,10 @@ def _ticks(low: float, high: float) -> Array:
 def _slabs(run: Trajectory) -> tuple[Slab, ...]:
     deepest = float(np.max(run.depth))
     slabs = []
-    for number, layer in enumerate(run.scene.tissue.layers):
+    for number, layer in numbered_layers(run.scene):
         start, end = layer_extent(layer, deepest, run.scene.needle.length)
         if end > start:
-            name = layer.name or f"layer {number + 1}"
-            slabs.append(Slab(MILLI * start, MILLI * end, f"{name}: {layer.foundation_modulus / MILLI:.3g} kN/m\u00b2"))
+            slabs.append(Slab(MILLI * start, MILLI * end, number, layer_text(number, layer), key_entry(number, layer)))
     return tuple(slabs)
 
 

@@ -10,7 +10,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
 from fem_needle.pictures import INK, png_bytes, shared_style
-from fem_needle.view.drawing import LEGEND, Drawing
+from fem_needle.view.drawing import Drawing
 
 Array = NDArray[np.float64]
 
@@ -32,10 +32,10 @@ def picture(drawn: Drawing) -> bytes:
         for label in drawn.labels:
             axes.text(*_turned(np.array([label.place]))[0], label.text, ha="center", fontsize=9, color=INK)
         _frame(axes, _turned(drawn.corners()))
-        for number, (name, color) in enumerate(LEGEND):
+        for number, (name, color) in enumerate(drawn.legend):
             figure.text(0.78, 0.9 - 0.035 * number, f"\u25a0 {name}", color=color, fontsize=9)
         figure.suptitle(drawn.title, x=0.02, ha="left")
-        figure.text(0.02, 0.03, f"{drawn.caption}\n{drawn.note}", ha="left", va="center", fontsize=9)
+        figure.text(0.02, 0.015, drawn.caption, ha="left", va="bottom", fontsize=9)
         return png_bytes(figure)
 
 

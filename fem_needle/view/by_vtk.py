@@ -10,7 +10,7 @@ import pyvista as pv
 
 from fem_needle.pictures import INK
 from fem_needle.view.arrangement import Arrangement
-from fem_needle.view.drawing import LEGEND, Drawing, Part, drawing, moving_parts
+from fem_needle.view.drawing import Drawing, Part, drawing, moving_parts, told
 from fem_needle.view.solids import Surface
 
 SIZE = (1400, 700)
@@ -38,7 +38,7 @@ def show(arranged: Arrangement, row: int) -> None:
             plotter.remove_actor(part.name, reset_camera=False)
             if len(part.surface.triangles):
                 _add(plotter, part)
-        _write(plotter, f"{pose.caption}\n{arranged.note}", (0.02, 0.03), name="caption")
+        _write(plotter, told(arranged, pose), (0.02, 0.03), name="caption")
 
     times = arranged.run.time
     if len(times) > 1:
@@ -62,9 +62,9 @@ def _fill(plotter: Any, drawn: Drawing) -> None:
             always_visible=True, justification_horizontal="center", justification_vertical="center",
         )  # fmt: skip
     _write(plotter, drawn.title, (0.02, 0.94), size=TEXT + 2)
-    _write(plotter, f"{drawn.caption}\n{drawn.note}", (0.02, 0.03), name="caption")
-    for number, (name, color) in enumerate(LEGEND):
-        _write(plotter, name, (0.76, 0.86 - 0.045 * number), color=color)
+    _write(plotter, drawn.caption, (0.02, 0.03), name="caption")
+    for number, (name, color) in enumerate(drawn.legend):
+        _write(plotter, name, (0.02, 0.88 - 0.04 * number), size=TEXT - 2, color=color)
     plotter.enable_parallel_projection()
     plotter.view_vector((0.28, 0.32, 1.0), viewup=(0.0, 1.0, 0.0))
     plotter.camera.zoom(1.55)

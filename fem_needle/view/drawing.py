@@ -7,15 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.layer_names import layer_key
+from fem_needle.pictures import SHADES
 from fem_needle.view.arrangement import Arrangement, Pose
 from fem_needle.view.solids import Surface
 
 Array = NDArray[np.float64]
 
-NEEDLE, LOAD, REACTION, PLATE, PATH = "#303030", "#D55E00", "#0072B2", "#777777", "#CC79A7"
+NEEDLE, LOAD, REACTION, PLATE, SPRING, PATH = "#303030", "#D55E00", "#0072B2", "#777777", "#009E73", "#CC79A7"
 LEGEND = (("needle", NEEDLE), ("loads on the needle", LOAD), ("forces of its supports", REACTION))
-LAYERS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442")  # Okabe and Ito: told apart by color-blind readers
-LAYER_OPACITY = 0.22
+GUIDES = (("rigid guides", PLATE), ("guides on springs", SPRING))
+LAYER_OPACITY = 0.4
+CHARACTER = 0.0095  # width of a letter over what is drawn along the insertion axis
+KEY_WIDTH = 125  # characters
 RULER, RULER_TICK, RULER_TEXT = 1.2, 1.3, 1.62  # half widths of the block below the axis
 
 
@@ -43,8 +47,8 @@ class Drawing:
 
     Attributes
     ----------
-    title, caption, note
-        What was run; time, depth and tip; what is not to scale.
+    title, caption
+        What was run; time, depth and tip, what is not to scale, and the key of layers that are numbered.
     parts, labels
         Surfaces and texts.
     lines
@@ -53,10 +57,15 @@ class Drawing:
 
     title: str
     caption: str
-    note: str
     parts: tuple[Part, ...]
     labels: tuple[Label, ...]
     lines: tuple[tuple[str, Array], ...]
+
+    @property
+    def legend(self) -> tuple[tuple[str, str], ...]:
+        """Names and colors of what is drawn, without the layers."""
+        shown = {part.name for part in self.parts}
+        return tuple((name, color) for name, color in (*LEGEND, *GUIDES) if name in shown or (name, color) in LEGEND)
 
     def corners(self) -> Array:
         """Return all points (n, 3) [mm] that a picture must hold."""
@@ -68,10 +77,10 @@ class Drawing:
 def drawing(arranged: Arrangement, row: int) -> Drawing:
     """Return a sample as colored surfaces."""
     parts = (*still_parts(arranged), *moving_parts(arranged.pose(row)))
-    caption = arranged.pose(row).caption
+    caption = told(arranged, arranged.pose(row))
     shown = tuple(part for part in parts if len(part.surface.triangles))
     texts = (*layer_labels(arranged), *ruler_labels(arranged))
-    return Drawing(title_of(arranged), caption, arranged.note, shown, texts, lines(arranged))
+    return Drawing(title_of(arranged), caption, shown, texts, lines(arranged))
 
 
 def title_of(arranged: Arrangement) -> str:
@@ -80,12 +89,13 @@ def title_of(arranged: Arrangement) -> str:
 
 
 def still_parts(arranged: Arrangement) -> tuple[Part, ...]:
-    """Return layers and template."""
+    """Return layers and guides."""
     blocks = zip(arranged.slabs, arranged.blocks(), strict=True)
     layers = [
-        Part(slab.label, block, LAYERS[number % len(LAYERS)], LAYER_OPACITY) for number, (slab, block) in enumerate(blocks)
+        Part(slab.note, block, SHADES[number % len(SHADES)], LAYER_OPACITY) for number, (slab, block) in enumerate(blocks)
     ]
-    return (*layers, Part("template", arranged.template, PLATE, 0.6))
+    guides = zip(GUIDES, (arranged.rigid_guides, arranged.spring_guides), strict=True)
+    return (*layers, *(Part(name, surface, color, 0.6) for (name, color), surface in guides))
 
 
 def moving_parts(pose: Pose) -> tuple[Part, ...]:
@@ -94,13 +104,42 @@ def moving_parts(pose: Pose) -> tuple[Part, ...]:
     return tuple(Part(name, surface, color) for (name, color), surface in zip(LEGEND, surfaces, strict=True))
 
 
-def layer_labels(arranged: Arrangement) -> tuple[Label, ...]:
-    """Return the names of the layers, above their blocks, on two heights in turn."""
-    half = arranged.half_width
-    return tuple(
-        Label(slab.label, (0.5 * (slab.start + slab.end), (1.5 + 0.3 * (number % 2)) * half, 0.0))
-        for number, slab in enumerate(arranged.slabs)
+def told(arranged: Arrangement, pose: Pose) -> str:
+    """Return time, depth and tip, what is not to scale, and the key where layers are numbered."""
+    key = "" if named(arranged) else layer_key((slab.note for slab in arranged.slabs), KEY_WIDTH)
+    return "\n".join(text for text in (pose.caption, arranged.note, key) if text)
+
+
+def named(arranged: Arrangement) -> bool:
+    """Return whether the names of all layers have room above their blocks, on two heights in turn."""
+    places = [0.5 * (slab.start + slab.end) for slab in arranged.slabs]
+    widths = [_width(arranged, slab.label) for slab in arranged.slabs]
+    return all(
+        later - first >= 0.5 * (one + other)
+        for first, later, one, other in zip(places, places[2:], widths, widths[2:], strict=False)
     )
+
+
+def layer_labels(arranged: Arrangement, *, numbered: bool | None = None) -> tuple[Label, ...]:
+    """Return names or numbers of the layers, above their blocks; by default names where they have room."""
+    half = arranged.half_width
+    if numbered is None and named(arranged):
+        return tuple(
+            Label(slab.label, (0.5 * (slab.start + slab.end), (1.5 + 0.45 * (place % 2)) * half, 0.0))
+            for place, slab in enumerate(arranged.slabs)
+        )
+    labels: list[Label] = []
+    for slab in arranged.slabs:
+        place, text = 0.5 * (slab.start + slab.end), str(slab.number)
+        if not labels or place - labels[-1].place[0] >= 1.5 * _width(arranged, text):
+            labels.append(Label(text, (place, 1.2 * half, -half)))
+    return tuple(labels)
+
+
+def _width(arranged: Arrangement, text: str) -> float:
+    """Return the width of a text [mm], about."""
+    places = arranged.ruler
+    return CHARACTER * len(text) * float(places[-1] - places[0])
 
 
 def ruler_labels(arranged: Arrangement) -> tuple[Label, ...]:

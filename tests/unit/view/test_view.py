@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,8 +18,8 @@ from fem_needle.errors import NeedleError
 from fem_needle.run_folder import save_run
 from fem_needle.scene import Guide, LateralLoad
 from fem_needle.view import Renderer, arrangement, picture, write_picture
-from fem_needle.view.drawing import drawing
-from fem_needle.view.html import html_page, shown_rows
+from fem_needle.view.drawing import drawing, layer_labels
+from fem_needle.view.html import _figure, _times, html_page, shown_rows
 from fem_needle.view.solids import arrow, box, plate, tube
 from tests.consistency.scenes import LAYERS, moving, scene_of
 
@@ -73,7 +74,7 @@ def test_arrows_point_where_forces_push(arranged):
 
 def test_what_is_not_to_scale_is_said(arranged):
     assert arranged.note.startswith(f"deflections {arranged.magnification:g} times as large; arrows: 25 mm = ")
-    assert "times as large" in drawing(arranged, 0).note
+    assert arranged.note in drawing(arranged, 0).caption
     shown = 1e3 * arranged.magnification * np.max(np.abs(arranged.run.station_deflection))
     assert 0.4 * 25.0 <= shown <= 25.0  # an eighth of 200 mm, by steps of 1, 2, 5
 
@@ -87,8 +88,48 @@ def test_magnification_may_be_given_and_a_needle_at_rest_has_none(magnification,
 
 def test_layers_and_ruler(arranged):
     assert [(slab.start, slab.end) for slab in arranged.slabs] == [(0.0, 50.0), (50.0, 80.0), (100.0, 150.0)]
-    assert arranged.slabs[1].label == "layer 2: 20 kN/m\u00b2"
+    assert [slab.number for slab in arranged.slabs] == [0, 1, 2]
+    assert arranged.slabs[1].label.replace("\u00a0", " ") == "layer 1, 20 kN/m\u00b2"
     assert arranged.ruler.tolist() == pytest.approx(np.arange(-150.0, 151.0, 50.0))
+
+
+def test_a_guide_on_a_spring_is_told_from_a_rigid_one():
+    guides = [{"position": -0.02}, {"position": -0.05, "stiffness": 300.0}]
+    drawn = drawing(arrangement(run_scene(SCENE.with_values({"support.guides": guides}))), 0)
+    plates = {part.name: part for part in drawn.parts if "guides" in part.name}
+    places = {name: set(part.surface.points[:, 0].tolist()) for name, part in plates.items()}
+    assert places == {"rigid guides": {-20.0}, "guides on springs": {-50.0}}
+    assert len({part.color for part in plates.values()}) == 2 and {*plates} <= {name for name, _ in drawn.legend}
+    page = html_page(arrangement(run_scene(SCENE)))
+    assert ">rigid guides</label>" in page and "guides on springs" not in page
+
+
+THIN = [{"name": f"a layer of fat {n}", "start": n / 100, "end": (n + 1) / 100, "foundation_modulus": 5e3} for n in range(8)]
+
+
+@pytest.mark.parametrize(("layers", "named"), [(THIN, False), (THIN[:1], True)])
+def test_names_of_layers_that_have_no_room_give_way_to_numbers_with_a_key(layers, named):
+    arranged = arrangement(run_scene(SCENE.with_values({"tissue.layers": layers})))
+    texts, caption = [label.text for label in layer_labels(arranged)], drawing(arranged, 0).caption.replace("\u00a0", " ")
+    assert texts == ([slab.label for slab in arranged.slabs] if named else [str(n) for n in range(8)])
+    assert ("0: a layer of fat 0, 5 kN/m²" in caption) is not named
+
+
+def test_a_page_numbers_its_layers_and_its_key_hides_the_right_parts(arranged):
+    page = html_page(arranged)
+    assert [label.text for label in layer_labels(arranged, numbered=True)] == ["0", "1", "2"]
+    assert '"text":"layer 0, ' not in page and "0: 5\u00a0kN/m²</label>" in page
+    figure = _figure(arranged, shown_rows(7), 0)
+    boxes = re.findall(r'value="(\d+)"><i style="background: (#\w+)"', page)
+    assert len(boxes) == 3 + 1 + 3 and [figure.data[int(number)].color for number, _ in boxes] == [color for _, color in boxes]
+    assert "7 of 7 samples" in page
+
+
+def test_times_at_the_slider_have_no_more_digits_than_they_need(arranged):
+    long = replace(arranged.run, time=np.linspace(0.0, 9.97, 7))
+    assert _times(replace(arranged, run=long), list(range(7))) == ["0", "2", "3", "5", "7", "8", "10"]
+    short = replace(arranged.run, time=np.linspace(0.0, 6e-4, 7))
+    assert _times(replace(arranged, run=short), [0, 1, 6]) == ["0", "0.0001", "0.0006"]
 
 
 @pytest.mark.parametrize("magnification", [0.0, -2.0, np.inf, np.nan])
