@@ -25,7 +25,14 @@ GUIDES = {RIGID: ("D", "white"), ON_A_SPRING: ("p", COLORS[5])}  # marker and co
 
 
 def set_limits(axes: Axes, run: Trajectory, rows: NDArray[np.intp]) -> None:
-    """Set limits [mm] that hold the needle at all given samples, its guides, the target and the cut path."""
+    """Set limits [mm] that hold what `limits` says."""
+    along, across = limits(run, rows)
+    axes.set_xlim(*along)
+    axes.set_ylim(*across)
+
+
+def limits(run: Trajectory, rows: NDArray[np.intp]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return limits [mm] along and across that hold the needle at all given samples, its guides, the target, the cut path."""
     scene, shown = run.scene, [placed(run, int(row)) for row in rows]
     deepest = max(float(along[-1]) for along, _ in shown)
     first = min(float(along[0]) for along, _ in shown)
@@ -39,8 +46,8 @@ def set_limits(axes: Axes, run: Trajectory, rows: NDArray[np.intp]) -> None:
     if len(run.path_position):
         across.append(MILLIMETERS * run.path_deflection)
     space = SPACE * (max(places) - min(places))
-    axes.set_xlim(min(places) - space, max(places) + space)
-    axes.set_ylim(*limits_of(np.concatenate(across), LEAST_RANGE * MILLIMETERS * scene.needle.length))
+    least = LEAST_RANGE * MILLIMETERS * scene.needle.length
+    return (min(places) - space, max(places) + space), limits_of(np.concatenate(across), least)
 
 
 def draw_scenery(axes: Axes, strip: Axes, run: Trajectory, width: float) -> None:

@@ -109,11 +109,11 @@ _LAYOUT: dict[str, Any] = {
     "font": {"color": INK, "size": 13, "family": "system-ui, sans-serif"},
     "plot_bgcolor": "white",
     "paper_bgcolor": "white",
-    "margin": {"l": 10, "r": 15, "t": 20, "b": 10},
+    "margin": {"l": 10, "r": 40, "t": 20, "b": 10},  # at the right for the toolbar, which would cover what is above a panel
     "showlegend": True,
     "hovermode": "closest",
     "dragmode": "zoom",
-    "modebar": {"remove": ["select2d", "lasso2d"]},
+    "modebar": {"remove": ["select2d", "lasso2d"], "orientation": "v"},
 }
 
 _LEGEND: dict[str, Any] = {"orientation": "h", "yanchor": "bottom", "x": 0.0, "bgcolor": "rgba(0,0,0,0)", "font": {"size": 12}}

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from fem_needle.closed_loop.units import shown_unit
 from fem_needle.figures import courses, energies, shapes
-from fem_needle.figures.common import LEAST_RANGE, MILLIMETERS, limits_of, placed, suited
+from fem_needle.figures.common import MILLIMETERS, placed, suited
 from fem_needle.figures.energy_figure import LEDGER
+from fem_needle.figures.scenery import ON_A_SPRING, RIGID, WANTED, guides_of, limits
 from fem_needle.figures.tissue import bands_of
+from fem_needle.layer_names import layer_key
 from fem_needle.pictures import COLORS, INK, png_bytes
 from fem_needle.report.charts import Curve, Panel, panels_figure, thinned
 from fem_needle.report.numbers import duration, millimeters
@@ -26,8 +28,10 @@ Array = NDArray[np.float64]
 MOST_FRAMES = 100  # positions of the slider, spread over the run
 NEEDLE_HEIGHT = 380  # pixels
 STATIONS = 101  # of the needle in a frame, at most
-SPACE = 0.04  # of the visible length
-OUTSIDE = 0.12  # of the depth: what is shown before the skin where nothing bends there
+LETTER = 0.02  # width of a letter over that of the picture on a small screen
+KEY_WIDTH = 1000  # characters: the browser breaks the lines
+SYMBOLS = {RIGID: ("diamond", "white", "white diamonds"), ON_A_SPRING: ("pentagon", COLORS[5], "blue pentagons")}
+TARGET = ("diamond", WANTED, "the purple diamond")
 TIME = "time [s]"
 
 
@@ -35,11 +39,10 @@ def needle_chart(run: Trajectory) -> Chart:
     """Return the needle in its tissue with a slider over time."""
     rows = thinned(len(run.time), MOST_FRAMES)
     figure = _needle_figure(run, rows)
-    caption = "The needle in the tissue, the skin at 0; deflections are drawn larger than lengths along the axis."
     alternative = f"Shape of the needle at {len(rows)} times; at the end the tip is {_tip(run, -1)}."
     static = Picture("The needle at some depths.", f"Shapes of the needle in the tissue. {alternative}", png_bytes(shapes(run)))
     moments = tuple(f"{duration(float(run.time[row]))}: {_tip(run, int(row))}" for row in rows)
-    return Chart("needle", caption, alternative, figure, static, moments, len(rows) - 1)
+    return Chart("needle", _needle_caption(run), alternative, figure, static, moments, len(rows) - 1)
 
 
 def _tip(run: Trajectory, row: int) -> str:
@@ -50,26 +53,20 @@ def _tip(run: Trajectory, row: int) -> str:
 
 def _needle_figure(run: Trajectory, rows: NDArray[np.intp]) -> go.Figure:
     lines = [placed(run, int(row)) for row in rows]
-    low = min(0.0, *(float(along[0]) for along, _ in lines))
-    high = max(0.0, *(float(along[-1]) for along, _ in lines))
-    if run.scene.support.kind == "entry":
-        low = max(low, -OUTSIDE * high)
-    low, high = low - SPACE * (high - low), high + SPACE * (high - low)
-    across = np.concatenate([values for _, values in lines])
-    least = LEAST_RANGE * MILLIMETERS * run.scene.needle.length
+    (low, high), across = limits(run, rows)
     straight = {"color": INK, "width": 1, "dash": "dash"}
     axis = go.Scatter(x=[low, high], y=[0.0, 0.0], mode="lines", line=straight, hoverinfo="skip", showlegend=False)
     figure = panels_figure([Panel("deflection [mm]", ())], "place along the axis [mm]")
-    figure.add_traces([axis, _needle_line(*lines[-1])])
+    figure.add_traces([axis, _needle_line(*lines[-1]), *_points(run)])
     figure.frames = [
         go.Frame(data=[_needle_line(*line)], traces=[1], name=str(index)) for index, line in enumerate(lines)
     ]
     figure.update_layout(
         height=NEEDLE_HEIGHT, showlegend=False, shapes=_blocks(run, low, high), annotations=_names(run, low, high),
-        margin={"l": 10, "r": 15, "t": 40, "b": 10},
+        margin={"l": 10, "r": 40, "t": 40, "b": 10},
     )  # fmt: skip
     figure.update_xaxes(range=[low, high])
-    figure.update_yaxes(range=list(limits_of(across, least)))
+    figure.update_yaxes(range=list(across))
     return figure
 
 
@@ -88,12 +85,48 @@ def _blocks(run: Trajectory, low: float, high: float) -> list[dict[str, Any]]:
 
 
 def _names(run: Trajectory, low: float, high: float) -> list[dict[str, Any]]:
-    """Return the layers' names above them; none where they would not fit side by side."""
-    bands = bands_of(run.scene, low, high)
-    if any(band.end - band.start < len(band.text) * 0.012 * (high - low) for band in bands):
-        return []
+    """Return the layers' names above them, or their numbers where one would not fit; of very many thin ones, some have none."""
+    bands, short = bands_of(run.scene, low, high), _numbered(run, low, high)
     place: dict[str, Any] = {"yref": "paper", "y": 1.0, "yanchor": "bottom", "showarrow": False, "font": {"size": 12}}
-    return [place | {"x": (band.start + band.end) / 2.0, "text": escape(band.text)} for band in bands]
+    texts = [str(band.number) if short else band.text for band in bands]
+    return [
+        place | {"x": (band.start + band.end) / 2.0, "text": escape(text)}
+        for band, text in zip(bands, texts, strict=True)
+        if not short or band.end - band.start >= len(text) * LETTER * (high - low)
+    ]
+
+
+def _numbered(run: Trajectory, low: float, high: float) -> bool:
+    """Return whether the name of a layer is longer than the layer between two places [mm]."""
+    return any(band.end - band.start < len(band.text) * LETTER * (high - low) for band in bands_of(run.scene, low, high))
+
+
+def _points(run: Trajectory) -> list[go.Scatter]:
+    """Return the guides and the target of a loop."""
+    target = run.scene.target
+    points = [_point(*SYMBOLS[kind][:2], kind, places, [0.0] * len(places)) for kind, places in guides_of(run).items()]
+    if target.depth is not None:
+        points.append(_point(*TARGET[:2], "target", [MILLIMETERS * target.depth], [MILLIMETERS * target.lateral]))
+    return points
+
+
+def _point(symbol: str, color: str, name: str, along: list[float], across: list[float]) -> go.Scatter:
+    marker = {"symbol": symbol, "color": color, "size": 11, "line": {"color": INK, "width": 1}}
+    return go.Scatter(x=along, y=across, mode="markers", marker=marker, name=name)
+
+
+def _needle_caption(run: Trajectory) -> str:
+    """Return what is drawn, what its symbols are, and the key of layers that are numbered."""
+    parts = ["The needle in the tissue, the skin at 0; deflections have a scale of their own."]
+    symbols = [f"{SYMBOLS[kind][2]}: {kind.replace('guide', 'guides')}" for kind in guides_of(run)]
+    symbols += [f"{TARGET[2]}: target"] if run.scene.target.depth is not None else []
+    if symbols:
+        told = "; ".join(symbols)
+        parts.append(f"{told[0].upper()}{told[1:]}.")
+    (low, high), _ = limits(run, thinned(len(run.time), MOST_FRAMES))
+    if _numbered(run, low, high):
+        parts.append(f"{layer_key((band.note for band in bands_of(run.scene, low, high)), KEY_WIDTH)}.")
+    return " ".join(parts)
 
 
 def course_chart(run: Trajectory) -> Chart:

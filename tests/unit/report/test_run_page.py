@@ -130,6 +130,33 @@ def test_curves_are_those_of_the_run(page, run):
     assert all(chart.picture is not None for chart in (needle, courses, energies))
 
 
+LAYERED = {
+    "tissue.layers": [{"name": "fat", "end": 0.02, "foundation_modulus": 5e3}, {"start": 0.02, "foundation_modulus": 2e4}],
+    "support.guides": [{"position": -0.01}, {"position": -0.3, "stiffness": 300.0}],
+    "target": {"lateral": 0.002, "depth": 0.19},
+}
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_moving_needle_has_its_layers_guides_and_target(run):
+    chart = run_charts.needle_chart(replace(run, scene=run.scene.with_values(LAYERED)))
+    points = {trace.name: (list(trace.x), trace.marker.symbol) for trace in chart.figure.data if trace.mode == "markers"}
+    assert points["rigid guide"] == ([-10.0], "diamond") and points["guide on a spring"] == ([-300.0], "pentagon")
+    assert points["target"][0] == [190.0]
+    low, high = chart.figure.layout.xaxis.range
+    assert low < -300.0 and high > 190.0
+    assert [note.text for note in chart.figure.layout.annotations] == ["0", "1"]
+    caption = chart.caption.replace("\u00a0", " ")
+    assert "White diamonds: rigid guides; blue pentagons: guides on a spring; the purple diamond: target." in caption
+    assert "0: fat, 5 kN/m²;  1: 20 kN/m²." in caption
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_toolbar_has_a_margin_of_its_own(run):
+    for chart in (run_charts.needle_chart(run), run_charts.course_chart(run)):
+        assert chart.figure.layout.modebar.orientation == "v" and chart.figure.layout.margin.r >= 40
+
+
 def test_nothing_that_a_scene_says_is_markup(html):
     assert "<script>alert" not in html and "<img src=x" not in html
     elements = Elements(html)
