@@ -1,4 +1,4 @@
-"""The picture of an analysis: gains of the tip over the depth with their zeros, and the lowest natural frequencies."""
+"""The picture of an analysis: gains of the tip over the depth with their zeros, and the lowest undamped natural frequencies."""
 
 from __future__ import annotations
 
@@ -81,8 +81,8 @@ def _draw_frequencies(panel: Axes, curve: DepthGains) -> None:
     for number, frequency in enumerate(curve.frequencies.T):
         if not np.any(np.isfinite(frequency)):
             continue
-        label = f"{number + 1}. natural\nfrequency" if number == 0 else f"{number + 1}."
+        label = f"{number + 1}. natural\nfrequency,\nundamped" if number == 0 else f"{number + 1}."
         line = LINES[number % len(LINES)]
         panel.plot(MILLIMETERS * curve.depths, frequency / (2 * pi), color=COLORS[number], linestyle=line, label=label)
     panel.set_yscale("log")
-    panel.set_ylabel("frequency [Hz]")
+    panel.set_ylabel("undamped [Hz]")

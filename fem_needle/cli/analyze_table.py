@@ -28,6 +28,7 @@ def show_analysis(analysis: Analysis, folder: Path) -> None:
     for change in analysis.curve.sign_changes:
         way = "with" if change.sign_beyond > 0 else "against"
         typer.echo(f"beyond {MILLIMETERS * change.depth:.5g} mm the tip goes {way} {change.input.replace('_', ' ')}")
+    typer.echo("vibrations: damped, overdamped ones left out; the picture and the CSV file have the undamped frequencies")
     slow = len(analysis.points[0].slow.states)
     typer.echo(f"controllable, observable: of {slow} states, the slowest vibrations; last the weakest singular value")
     typer.echo(f"folder: {folder}")

@@ -16,6 +16,7 @@ MILLI, DEGREE = 1e3, np.pi / 180.0
 # By the unit of the input: unit of a gain of the tip, and how many of it 1 m per SI unit is.
 GAINS = {"N": ("mm/N", MILLI), "m": ("mm/mm", 1.0), "rad": ("mm/deg", MILLI * DEGREE), "N m": ("mm/(N mm)", 1.0)}
 FREQUENCIES = 3
+DAMPED = "Vibrations are those of the damped poles, overdamped ones left out; curves over the depth are undamped frequencies."
 
 
 def analyze_parts(data: dict[str, Any], columns: Columns, scene: Scene) -> StudyParts:
@@ -24,7 +25,7 @@ def analyze_parts(data: dict[str, Any], columns: Columns, scene: Scene) -> Study
     axial = "depth and speed are states" if data["axial"] == "free" else "the depth is given"
     told = f"Linear models of {model_words(data)} at {len(data['depths'])} depths, at {time} and {speed}; {axial}."
     paragraphs = (("Study", told), ("Signs", _signs(data)))
-    picture = "Static gains of the tip and natural frequencies over the depth."
+    picture = "Static gains of the tip and undamped natural frequencies over the depth."
     warnings = tuple(str(text) for text in data.get("warnings", ()))
     grids = (_states(data), _verdicts(data))
     return StudyParts("Analysis for control", paragraphs, grids, _charts(columns), picture, warnings)
@@ -49,7 +50,7 @@ def _states(data: dict[str, Any]) -> Grid:
         unit, factor = GAINS[units.get(name, "m")]
         gains = (point["static_gains"].get(name) for point in points)
         rows.append((f"tip by {name.replace('_', ' ')} [{unit}]", *(number(None if g is None else factor * g) for g in gains)))
-    return Grid("At each depth", ("", *(millimeters(point["depth"]) for point in points)), tuple(rows))
+    return Grid("At each depth", ("", *(millimeters(point["depth"]) for point in points)), tuple(rows), DAMPED)
 
 
 def _vibration(point: dict[str, Any], index: int) -> str:
@@ -89,10 +90,10 @@ def _charts(columns: Columns) -> tuple[Chart, ...]:
     panels += [Panel(f"tip gain [{unit}]", tuple(curves)) for (unit, _), curves in groups.items()]
     frequencies = [header for header in columns if header.startswith("natural_frequency")]
     curves = tuple(
-        Curve(f"frequency {index}", depth, column(columns, header) / (2.0 * np.pi))
+        Curve(f"undamped frequency {index}", depth, column(columns, header) / (2.0 * np.pi))
         for index, header in enumerate(frequencies, start=1)
     )
     if curves:
-        panels.append(Panel("frequency [Hz]", curves))
-    about = "Static gains of the tip by each input and the lowest natural frequencies over the depth."
+        panels.append(Panel("undamped frequency [Hz]", curves))
+    about = "Static gains of the tip by each input and the lowest undamped natural frequencies over the depth."
     return (Chart("gains", about, about, panels_figure(panels, "depth [mm]")),) if panels else ()

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from fem_needle import FiniteElementNeedle, SceneError, analyze, load_scene, solve_static
 from fem_needle.analysis.depth_gains import depth_gains, tip_gains
 from fem_needle.analysis.matlab import analysis_matlab
+from fem_needle.analysis.picture import analysis_picture
 from fem_needle.analysis.study import scene_depths
 from fem_needle.exact import exact_static
 from fem_needle.linear.linearization import linearize
@@ -125,10 +126,19 @@ def command(command_line, monkeypatch, tmp_path):
 FEW = ("--elements", "4")
 
 
+def test_the_picture_says_that_its_frequencies_are_undamped(monkeypatch):
+    drawn = []
+    monkeypatch.setattr("fem_needle.analysis.picture.png_bytes", lambda figure: drawn.append(figure) or b"")
+    analysis_picture(analyze(load_scene("brachytherapy").with_values({"numerics.elements": 2}), [0.06]))
+    panel = drawn[0].axes[-1]
+    assert panel.get_ylabel() == "undamped [Hz]" and "undamped" in panel.get_legend().get_texts()[0].get_text()
+
+
 def test_the_command_leaves_its_files(command, tmp_path):
     depths = ("--depth", "60mm", "--depth", "0.09")
     status, out, err = command("brachytherapy", *FEW, *depths, "--time", "5 s")
     assert (status, err) == (0, "")
+    assert "damped, overdamped ones left out; the picture and the CSV file have the undamped frequencies" in out
     assert "90 mm" in out and "mm/N" in out and "the tip goes against lateral force" in out
     folder = tmp_path / "runs" / "brachytherapy-analyze"
     plain = json.loads((folder / "analyze.json").read_text())

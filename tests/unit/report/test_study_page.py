@@ -123,6 +123,8 @@ def check_analyze(page, data):
     rows = {row[0]: row[1:] for row in cells(page, "At each depth")}
     gains = [point["static_gains"]["tip_force"] for point in data["depths"]]
     assert [float(cell) for cell in rows["tip by tip force [mm/N]"]] == pytest.approx([1e3 * gain for gain in gains], rel=1e-3)
+    note = next(grid for section in page.sections for grid in section.grids if grid.caption == "At each depth").note
+    assert "damped poles, overdamped ones left out" in note and "undamped frequency 1" in {trace.name for trace in curves(page)}
     frequency = data["depths"][0]["natural_frequencies"][0] / (2.0 * np.pi)
     assert float(rows["vibration 1"][0].partition("\u00a0")[0]) == pytest.approx(frequency, rel=1e-3)
 
