@@ -12,6 +12,7 @@ MOST_ROWS = 25  # of a table
 LONGEST_TITLE = 60  # characters, in the short text
 SHORT_FACTS = 5  # facts in the short text
 MILLIMETERS = 1e3
+ROUNDING = 1e-12  # of the largest value of a kind: a smaller one is shown as 0
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,11 @@ def text(value: Any, digits: int = 6) -> str:
 def in_millimeters(value: float | None, digits: int = 4) -> str:
     """Return a length [m] as a text in mm; nothing to say of None."""
     return "none" if value is None else f"{MILLIMETERS * value:.{digits}g} mm"
+
+
+def without_rounding(value: float, largest: float) -> float:
+    """Return a value, 0 where it is round-off beside the largest of its kind."""
+    return 0.0 if abs(value) < ROUNDING * largest else value
 
 
 def columns_in_millimeters(columns: Mapping[str, Sequence[Any]]) -> dict[str, list[Any]]:

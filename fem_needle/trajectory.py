@@ -11,7 +11,7 @@ import numpy as np
 import scipy  # its parts are loaded where they are used
 from numpy.typing import NDArray
 
-from fem_needle.display import Card, Shown, in_millimeters
+from fem_needle.display import Card, Shown, in_millimeters, without_rounding
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample
 from fem_needle.scene import Scene, as_function
@@ -115,15 +115,16 @@ class Trajectory(Shown):
 
     def _card(self) -> Card:
         summary, model = self.summary, str(self.summary.get("model", self.scene.model.kind))
+        largest = float(np.max(np.abs(self.tip_deflection)))
         ending = summary.get("stop_reason", "end")
         facts = [
             ("depth", f"{in_millimeters(float(self.depth[-1]))} at {self.time[-1]:.4g} s ({ending})"),
-            ("tip", f"{in_millimeters(float(self.tip_deflection[-1]))}"),
+            ("tip", in_millimeters(without_rounding(float(self.tip_deflection[-1]), largest))),
             ("push", f"{self.push_force[-1]:.4g} N"),
             ("analysis", f"{summary.get('analysis', 'unknown')}"),
             ("model", model),
             ("samples", str(len(self.time))),
-            ("largest tip", in_millimeters(float(np.max(np.abs(self.tip_deflection))))),
+            ("largest tip", in_millimeters(largest)),
             *((name.replace("_", " "), f"{summary[name]:.1e}") for name in _RATIOS if summary.get(name) is not None),
             *(("signal", name) for name in self.signals),
         ]

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fem_needle.display import without_rounding
+
 if TYPE_CHECKING:
     from fem_needle.trajectory import Trajectory
 
@@ -37,6 +39,7 @@ def run_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str]) -> It
     summary = run.summary
     yield "depth", f"{1e3 * summary['final_depth']:.4g} mm at {run.time[-1]:.4g} s ({summary['stop_reason']})"
     tip, largest = 1e3 * summary["final_tip_deflection"], 1e3 * summary["max_abs_tip_deflection"]
+    tip = without_rounding(tip, largest)
     yield "tip deflection", f"{tip:.4g} mm (largest {largest:.4g} mm)"
     yield "push force", f"{run.push_force[-1]:.4g} N"
     yield "energy residual", f"{summary['relative_energy_residual']:.1e} of the largest lateral energy"

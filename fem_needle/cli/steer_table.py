@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fem_needle.cli.run_table import EXPLANATION as RUN_EXPLANATION
 from fem_needle.cli.run_table import Row, computation_rows
+from fem_needle.display import without_rounding
 
 if TYPE_CHECKING:
     from fem_needle.closed_loop.repeated import RepeatedLoop
@@ -47,6 +48,7 @@ def steer_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str]) -> 
     for name in summary["effort"]:
         yield "command", f"{name.replace('_', ' ')}: {_spent(name, summary['largest_command'][name], summary['effort'][name])}"
     largest, last = (1e3 * summary[key] for key in ("max_abs_tip_deflection", "final_tip_deflection"))
+    last = without_rounding(last, largest)
     yield "tip deflection", f"largest {largest:.4g} mm, {last:.4g} mm at the end"
     yield from _loop_rows(run.scene)
     residual = summary["relative_energy_residual"]

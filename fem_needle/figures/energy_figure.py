@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fem_needle.display import ROUNDING
 from fem_needle.figures.common import name_figure, set_time_limits, suited
 from fem_needle.figures.course_figure import Panel, draw_panel
 from fem_needle.pictures import new_figure, shared_style
@@ -75,8 +76,26 @@ def energies(run: Trajectory) -> Figure:
     return figure
 
 
+def ledger_terms(run: Trajectory, title: str, names: dict[str, str]) -> dict[str, Array]:
+    """Return the terms of a panel [J] by variable; one that is round-off throughout beside the largest energy is 0.
+
+    Residuals stay what they are: how small they are is what they tell.
+    """
+    known = {name: np.asarray(getattr(run, name)) for name in names}
+    if title == RESIDUALS:
+        return known
+    least = ROUNDING * largest_energy(run)
+    return {name: values * (not np.all(np.abs(values) < least)) for name, values in known.items()}
+
+
+def largest_energy(run: Trajectory) -> float:
+    """Return the largest magnitude of all energies, works and losses [J]."""
+    terms = [getattr(run, name) for title, names in LEDGER if title != RESIDUALS for name in names]
+    return max(float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0)) for values in terms)
+
+
 def _panel(run: Trajectory, title: str, names: dict[str, str]) -> Panel:
-    known = {name: getattr(run, name) for name in names}
+    known = ledger_terms(run, title, names)
     drawn = {name: values for name, values in known.items() if np.any(np.nan_to_num(values))}
     size, unit = suited(drawn.values(), "J")
     curves = {names[name]: values / size for name, values in drawn.items()}

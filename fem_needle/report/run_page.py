@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from fem_needle.closed_loop.units import shown_unit
+from fem_needle.display import without_rounding
 from fem_needle.figures import tip_path, waterfall
 from fem_needle.figures.common import suited
-from fem_needle.figures.energy_figure import LEDGER
+from fem_needle.figures.energy_figure import LEDGER, RESIDUALS, largest_energy, ledger_terms
 from fem_needle.pictures import png_bytes
 from fem_needle.report.numbers import MISSING, millimeters, number, quantity, ratio, tidy, with_unit
 from fem_needle.report.parts import Grid, Page, Picture, Section
@@ -190,12 +191,13 @@ def _ledger_section(run: Trajectory) -> Section:
 
 
 def _ledger_grid(run: Trajectory, title: str, names: dict[str, str]) -> Grid:
-    size, unit = suited([getattr(run, name) for name in names], "J")
+    terms = ledger_terms(run, title, names)
+    size, unit = suited(terms.values(), "J")
+    largest = 0.0 if title == RESIDUALS else largest_energy(run)
     rows = []
-    for name in names:
-        values = getattr(run, name)
+    for name, values in terms.items():
         finite = values[np.isfinite(values)]
         ends = (values[0], values[-1], np.max(np.abs(finite))) if finite.size else (np.nan,) * 3
-        cells = (number(float(end) / size) for end in ends)
+        cells = (number(without_rounding(float(end), largest) / size) for end in ends)
         rows.append((VARIABLES[name][1], *("not computed" if cell == MISSING else cell for cell in cells)))
     return Grid(title, ("term", f"start [{unit}]", f"end [{unit}]", f"largest magnitude [{unit}]"), tuple(rows))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from fem_needle import run_scene
+from fem_needle.cli.run_table import run_rows
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.manifest import manifest
 from fem_needle.report import html_page, read_folder, run_charts, write_report
@@ -112,6 +113,19 @@ def test_the_ledger_has_every_term_at_the_end(page, run):
 
 
 @pytest.mark.usefixtures("undrawn")
+def test_round_off_in_the_ledger_and_in_the_table_is_zero(run, folder):
+    noise = np.where(run.time > 0.0, 1e-45, 0.0)
+    page = of(replace(run, series=run.series | {"hub_work": noise}), folder)
+    [row] = [row for grid in section(page, "ledger").grids for row in grid.rows if row[0].startswith("work of the moving hub")]
+    assert row[1:] == ("0", "0", "0")
+    tip = run.tip_deflection * (run.time < run.time[-1]) + 1e-30
+    loaded = replace(run, series=run.series | {"tip_deflection": tip})
+    assert ", tip 0 mm, " in str(loaded)
+    summary = run.summary | {"final_tip_deflection": 1e-30}
+    assert dict(run_rows(replace(run, summary=summary), folder, ()))["tip deflection"].startswith("0 mm (largest ")
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_versions_of_the_run_stand_beside_those_of_the_report(run, folder):
     known = json.loads((folder / "manifest.json").read_bytes())
     known["versions"]["numpy"] = "0.0.1"
@@ -132,7 +146,7 @@ def test_curves_are_those_of_the_run(page, run):
 
 LAYERED = {
     "tissue.layers": [{"name": "fat", "end": 0.02, "foundation_modulus": 5e3}, {"start": 0.02, "foundation_modulus": 2e4}],
-    "support.guides": [{"position": -0.01}, {"position": -0.3, "stiffness": 300.0}],
+    "support.guides": [{"position": -0.01}, {"position": -0.03, "stiffness": 300.0}],
     "target": {"lateral": 0.002, "depth": 0.19},
 }
 
@@ -141,10 +155,10 @@ LAYERED = {
 def test_the_moving_needle_has_its_layers_guides_and_target(run):
     chart = run_charts.needle_chart(replace(run, scene=run.scene.with_values(LAYERED)))
     points = {trace.name: (list(trace.x), trace.marker.symbol) for trace in chart.figure.data if trace.mode == "markers"}
-    assert points["rigid guide"] == ([-10.0], "diamond") and points["guide on a spring"] == ([-300.0], "pentagon")
+    assert points["rigid guide"] == ([-10.0], "diamond") and points["guide on a spring"] == ([-30.0], "pentagon")
     assert points["target"][0] == [190.0]
     low, high = chart.figure.layout.xaxis.range
-    assert low < -300.0 and high > 190.0
+    assert low < -30.0 and high > 190.0
     assert [note.text for note in chart.figure.layout.annotations] == ["0", "1"]
     caption = chart.caption.replace("\u00a0", " ")
     assert "White diamonds: rigid guides; blue pentagons: guides on a spring; the purple diamond: target." in caption
