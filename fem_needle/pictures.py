@@ -7,7 +7,9 @@ from io import BytesIO
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 WIDTH, HEIGHT = 7.0, 4.6  # inches
 DOTS_PER_INCH = 120
@@ -18,6 +20,7 @@ DASHES: Any = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)), (0, (
 # Of the layers of tissue, behind dark lines and letters.
 SHADES = ("#f4e3d2", "#e3bfa6", "#eddcb4", "#d9c3c8", "#f1d5c4", "#dcc9a9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
+MOST_TURNS = 80  # of a curve: beyond, dashes merge into a band
 STYLE: Any = {
     "font.size": 10.0,
     "axes.titlesize": 11.0,
@@ -37,6 +40,13 @@ FORMATS = ("png", "svg", "pdf")
 # Letters stay letters, which can be searched and edited; names inside a file do not change from one writing to the next.
 _VECTOR_STYLE: Any = {"svg.fonttype": "none", "svg.hashsalt": "fem-needle", "pdf.fonttype": 42}
 _METADATA: Any = {"svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None, "Creator": None, "Producer": None}}
+
+
+def crowded(values: NDArray[np.float64]) -> bool:
+    """Return whether a curve turns so often that it is to be drawn thin and without dashes."""
+    steps = np.diff(values[np.isfinite(values)])
+    ways = np.sign(steps[steps != 0.0])
+    return int(np.count_nonzero(np.diff(ways))) > MOST_TURNS
 
 
 def new_figure(width: float = WIDTH, height: float = HEIGHT) -> Figure:

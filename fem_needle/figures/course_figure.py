@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fem_needle.axial import cutting_forces
 from fem_needle.closed_loop.units import shown_unit
 from fem_needle.figures.common import (
     ABOVE,
@@ -22,13 +23,14 @@ from fem_needle.figures.common import (
     set_time_limits,
     suited,
 )
-from fem_needle.pictures import COLORS, DASHES, new_figure, shared_style
+from fem_needle.pictures import COLORS, DASHES, crowded, new_figure, shared_style
 from fem_needle.scene.signals import INPUT_UNITS
 from fem_needle.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
 WIDTH, PANEL_HEIGHT = 8.0, 2.0  # inches
+THIN = 0.8  # points: lines of curves that turn very often
 MOST_GUIDES = 3  # that have a line of their own
 LEAST_FORCE = 0.05  # of a unit, that a panel shows in it
 COMMAND = "command_"
@@ -83,28 +85,45 @@ def draw_panel(axes: Axes, panel: Panel, run: Trajectory) -> None:
     """Draw the curves of a panel over the time; their names above it where there is more than one."""
     draw_zero(axes)
     for number, (name, values) in enumerate(panel.curves.items()):
-        style = {"color": COLORS[number % len(COLORS)], "linestyle": DASHES[number % len(DASHES)]}
+        line = {"linestyle": "-", "linewidth": THIN} if crowded(values) else {"linestyle": DASHES[number % len(DASHES)]}
+        style = {"color": COLORS[number % len(COLORS)], **line}
         axes.plot(run.time, values, label=name, **style, **lone_marker(run))
         mark_end(axes, run.time, values, run)
     everything = np.concatenate([*panel.curves.values()]) if panel.curves else np.zeros(0)
     axes.set_ylim(*limits_of(everything, 0.0))
     axes.set_ylabel(panel.label)
-    zero = bool(panel.curves) and not np.any(everything)
+    zero = bool(panel.curves) and not np.any(np.nan_to_num(everything))
     axes.set_title(f"{panel.title}{', zero throughout' if zero else ''}", loc="left")
     if len(panel.curves) > 1:
         axes.legend(ncols=len(panel.curves), fontsize=SMALL, handlelength=2.0, columnspacing=1.0, **ABOVE)
 
 
 def _panels(run: Trajectory) -> tuple[Panel, ...]:
-    axial = {"push": run.push_force, "friction": run.friction_force}
     hub = {} if _all_zero(run.hub_force) else {"hub" if run.scene.support.kind == "hub" else "clamp": run.hub_force}
     lateral = {"tissue": run.tissue_force} | hub | _guides(run)
     return (
         Panel("Tip", "tip [mm]", {"deflection": MILLIMETERS * run.tip_deflection}),
         Panel("Insertion", "depth [mm]", {"depth": MILLIMETERS * run.depth}),
-        _forces("Axial forces", axial),
+        _forces("Axial: push and what resists it", axial_forces(run)),
         _forces("Lateral forces on the needle", lateral),
     )
+
+
+def axial_forces(run: Trajectory) -> dict[str, Array]:
+    """Return push, friction and cutting [N] over the time, by name; of a push also what holds the needle while it rests.
+
+    The cutting force is that of the layer which holds the tip while the tip advances at its deepest, as the scene says. What
+    the three leave over is the needle's own axial force, and inertia.
+    """
+    friction, found = run.friction_force, {"push": run.push_force}
+    resting = (run.speed == 0.0) & (friction != 0.0)
+    found["friction"] = np.where(resting, np.nan, friction)
+    cutting = cutting_forces(run.scene, run.depth, run.speed, np.maximum.accumulate(run.depth))
+    if np.any(cutting):
+        found["cutting"] = np.where(resting, np.nan, cutting)
+    if np.any(resting):
+        found["hold at rest"] = np.where(resting, friction, np.nan)
+    return found
 
 
 def _forces(title: str, curves: dict[str, Array]) -> Panel:

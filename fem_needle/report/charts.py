@@ -12,7 +12,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from fem_needle.pictures import COLORS, INK
+from fem_needle.pictures import COLORS, INK, crowded
 
 Array = NDArray[np.float64]
 
@@ -127,10 +127,10 @@ def _trace(curve: Curve, place: int, number: str) -> go.Scatter:
     chosen = thinned(len(curve.x))
     marked = curve.markers or len(curve.x) == 1
     mode = "+".join(part for part, wanted in (("lines", curve.line), ("markers", marked)) if wanted)
-    color = COLORS[place % len(COLORS)]
+    color, thin = COLORS[place % len(COLORS)], crowded(curve.y)
     return go.Scatter(
         x=curve.x[chosen], y=curve.y[chosen], mode=mode, name=escape(shorten(curve.name, LONGEST_NAME, placeholder=" ...")),
-        line={"color": color, "width": 2, "dash": DASHES[place % len(DASHES)]},
+        line={"color": color, "width": 1 if thin else 2, "dash": "solid" if thin else DASHES[place % len(DASHES)]},
         marker={"color": color, "size": 8, "symbol": SYMBOLS[place % len(SYMBOLS)]},
         xaxis="x", yaxis=f"y{number}", legend=f"legend{number}", connectgaps=False,
     )  # fmt: skip

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from fem_needle.closed_loop.units import shown_unit
 from fem_needle.figures import courses, energies, shapes
 from fem_needle.figures.common import MILLIMETERS, placed, suited
-from fem_needle.figures.energy_figure import LEDGER
+from fem_needle.figures.course_figure import axial_forces
+from fem_needle.figures.energy_figure import LEDGER, ledger_terms
 from fem_needle.figures.scenery import ON_A_SPRING, RIGID, WANTED, guides_of, limits
 from fem_needle.figures.tissue import bands_of
 from fem_needle.layer_names import layer_key
@@ -33,6 +34,10 @@ KEY_WIDTH = 1000  # characters: the browser breaks the lines
 SYMBOLS = {RIGID: ("diamond", "white", "white diamonds"), ON_A_SPRING: ("pentagon", COLORS[5], "blue pentagons")}
 TARGET = ("diamond", WANTED, "the purple diamond")
 TIME = "time [s]"
+COURSES = (
+    "Courses over time; lateral forces act on the needle. Friction and cutting are drawn as their sizes against the motion, "
+    "while the needle rests under a push what holds it; what they leave of the push is the needle's own axial force and inertia."
+)
 
 
 def needle_chart(run: Trajectory) -> Chart:
@@ -134,14 +139,13 @@ def course_chart(run: Trajectory) -> Chart:
     panels = [
         Panel("tip [mm]", (_over_time(run, "tip deflection", MILLIMETERS * run.tip_deflection),)),
         Panel("depth [mm]", (_over_time(run, "depth", MILLIMETERS * run.depth),)),
-        _suited(run, "axial force", "N", {"push": run.push_force, "friction": run.friction_force}),
+        _suited(run, "axial force", "N", axial_forces(run)),
         _suited(run, "lateral force", "N", _lateral(run)),
         *_commands(run),
     ]
     largest = float(np.nanmax(np.abs(run.tip_deflection), initial=0.0))
     about = f"Tip deflection, depth, axial and lateral forces over time; the tip deflects by up to {millimeters(largest)}."
-    static = Picture("Courses over time; forces act on the needle.", about, png_bytes(courses(run)))
-    return Chart("courses", "Courses over time; forces act on the needle.", about, panels_figure(panels, TIME), static)
+    return Chart("courses", COURSES, about, panels_figure(panels, TIME), Picture(COURSES, about, png_bytes(courses(run))))
 
 
 def _over_time(run: Trajectory, name: str, values: Array) -> Curve:
@@ -174,7 +178,7 @@ def energy_chart(run: Trajectory) -> Chart:
     """Return stored energies, works and residuals over time; terms that are zero throughout have no curve."""
     panels = []
     for title, names in LEDGER:
-        known = {short: getattr(run, name) for name, short in names.items()}
+        known = {names[name]: values for name, values in ledger_terms(run, title, names).items()}
         drawn = {short: values for short, values in known.items() if np.any(np.nan_to_num(values))}
         if drawn:
             panels.append(_suited(run, title.lower(), "J", drawn))

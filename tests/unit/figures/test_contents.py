@@ -7,11 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from fem_needle import SceneError, Trajectory
+from fem_needle import SceneError, Trajectory, load_scene, run_scene
 from fem_needle.figures import courses, energies, shapes, tip_path, waterfall
+from fem_needle.figures.course_figure import Panel, draw_panel
 from fem_needle.figures.tissue import bands_of
+from fem_needle.pictures import crowded
 from tests.unit.figures.runs import run_named
 
 SIZES = {"J": 1.0, "mJ": 1e-3, "µJ": 1e-6, "nJ": 1e-9, "pJ": 1e-12, "N": 1.0, "mN": 1e-3, "µN": 1e-6, "mm": 1e-3}
@@ -126,6 +129,45 @@ def test_courses_are_the_series():
     np.testing.assert_allclose(si(axial, "friction"), run.friction_force, rtol=1e-12)
     for name, values in (("tissue", run.tissue_force), ("hub", run.hub_force), ("guide", run.guide_force[:, 0])):
         np.testing.assert_allclose(si(lateral, name), values, rtol=1e-12)
+
+
+def test_forces_along_the_axis_balance_and_a_needle_that_rests_has_no_friction_of_motion():
+    """push = inertia + friction + cutting - A; a straight needle has no A, and this one of 2 g is hardly accelerated."""
+    layers = [{"name": "skin", "start": 0.004, "foundation_modulus": 5e3, "cutting_force": 0.5, "puncture_force": 2.0}]
+    push = {"time": [0.0, 2.0], "value": [0.0, 4.0]}
+    values = {"tissue.layers": layers, "loads": [], "insertion.push_force": push, "numerics.output_step": 0.02}
+    run = run_scene(load_scene("liver-push").with_values(values))
+    axes = panel(courses(run), "Axial")
+    shown = {name: si(axes, name) for name in ("push", "friction", "cutting", "hold at rest")}
+    resting = np.isfinite(shown["hold at rest"])
+    assert np.any(resting) and np.all(run.speed[resting] == 0.0) and np.all(np.isnan(shown["friction"][resting]))
+    np.testing.assert_allclose(shown["hold at rest"][resting], run.push_force[resting], rtol=1e-9)
+    advancing = run.speed > 0.0
+    assert set(np.round(shown["cutting"][advancing], 9)) == {0.0, 0.5} and np.count_nonzero(advancing) > 10
+    gap = np.abs(run.push_force - shown["friction"] - shown["cutting"])[advancing & (run.depth > 0.006)]
+    assert len(gap) > 10 and np.median(gap) < 0.01 * np.max(run.push_force)
+
+
+def test_a_curve_that_turns_very_often_is_thin_and_not_dashed():
+    assert crowded(np.sin(np.linspace(0.0, 800.0, 4000))) and not crowded(np.sin(np.linspace(0.0, 80.0, 4000)))
+    run, axes = run_named("hub"), Figure().subplots()
+    fast = np.sin(400.0 * np.linspace(0.0, 1.0, 2000))
+    slow = replace(run, time=np.linspace(0.0, 1.0, 2000))
+    draw_panel(axes, Panel("Two", "force [N]", {"one": fast, "other": np.ones(2000)}), slow)
+    drawn = lines(axes)
+    assert (drawn["one"].get_linestyle(), drawn["other"].get_linestyle()) == ("-", "--")
+    assert drawn["one"].get_linewidth() < drawn["other"].get_linewidth()
+    draw_panel(axes, Panel("Two", "force [N]", {"first": np.ones(2000), "second": fast}), slow)
+    assert lines(axes)["second"].get_linestyle() == "-"
+
+
+def test_energies_that_are_round_off_are_zero():
+    run = run_named("hub")
+    noise = run.series | {"load_work": np.full(len(run.time), 1e-16 * np.max(run.bending_energy))}
+    works = panel(energies(replace(run, series=noise)), "Lateral works")
+    assert "loads" not in lines(works)
+    residual = run.series | {"energy_residual": np.full(len(run.time), 1e-16 * np.max(run.bending_energy))}
+    assert "lateral" in panel(energies(replace(run, series=residual)), "Residuals").get_title(loc="left")
 
 
 def test_courses_show_the_command_of_a_loop():
