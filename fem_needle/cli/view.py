@@ -46,6 +46,8 @@ def view(
     if html is None and picture is None and not windowed:
         picture = run / PICTURE
         typer.echo("note: no display, so a picture in place of a window", err=True)
+    if picture is not None and picture.suffix.lower() != ".png":
+        raise SceneError(f"--picture: is no PNG file by its name (got {picture.name!r}; allowed a name that ends in .png)")
     for path in (html, picture):
         if path is not None and path.exists() and not force:
             raise SceneError(f"{path}: exists already (use --force to replace it)")
