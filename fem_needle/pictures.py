@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from io import BytesIO
+from textwrap import wrap
 from typing import Any
 
 import matplotlib as mpl
@@ -20,6 +21,9 @@ DASHES: Any = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)), (0, (
 # Of the layers of tissue, behind dark lines and letters.
 SHADES = ("#f4e3d2", "#e3bfa6", "#eddcb4", "#d9c3c8", "#f1d5c4", "#dcc9a9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
+TITLE_SIZE = 10.0  # points
+LETTER = 0.58  # width of a letter over its height, on average
+POINTS = 72.0  # of an inch
 MOST_TURNS = 80  # of a curve: beyond, dashes merge into a band
 STYLE: Any = {
     "font.size": 10.0,
@@ -52,6 +56,19 @@ def crowded(values: NDArray[np.float64]) -> bool:
 def new_figure(width: float = WIDTH, height: float = HEIGHT) -> Figure:
     """Return an empty figure [inches] that lays its parts out by itself; draw inside ``shared_style()``."""
     return Figure(figsize=(width, height), dpi=DOTS_PER_INCH, layout="constrained")
+
+
+def title_lines(title: str, width: float) -> str:
+    """Return a title in one or two lines that fit a width [inches]; what two do not hold ends in "..."."""
+    most = int(POINTS * width / (LETTER * TITLE_SIZE))
+    return "\n".join(wrap(title, most, max_lines=2, placeholder=" ..."))
+
+
+def write_title(figure: Figure, title: str, ending: str = "") -> None:
+    """Write a title above a whole figure, in two lines where it is long; ``ending`` is never cut."""
+    width = float(figure.get_size_inches()[0]) - len(ending) * LETTER * TITLE_SIZE / POINTS
+    lines = title_lines(title, 0.98 * width) + ending
+    figure.suptitle(lines, x=0.01, ha="left", fontsize=TITLE_SIZE, parse_math=False)
 
 
 def shared_style() -> AbstractContextManager[None]:

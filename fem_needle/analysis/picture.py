@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import pi
-from textwrap import shorten
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from fem_needle.analysis.depth_gains import DepthGains
 from fem_needle.analysis.study import Analysis
-from fem_needle.pictures import COLORS, INK, MARKERS, WIDTH, new_figure, png_bytes, shared_style
+from fem_needle.pictures import COLORS, INK, MARKERS, WIDTH, new_figure, png_bytes, shared_style, write_title
 
 Array = NDArray[np.float64]
 
@@ -25,7 +24,6 @@ SHOWN = {
     "rad": ("tip per angle [mm/deg]", 1e3 * pi / 180.0),
     "N m": ("tip per torque [mm/(N mm)]", 1.0),
 }
-LONGEST_TITLE = 110  # characters across the picture
 LINES = ("-", (0, (6, 2)), (0, (2, 1.5)), "-.")
 
 
@@ -39,7 +37,7 @@ def analysis_picture(analysis: Analysis) -> bytes:
         for panel, unit in zip(panels, units, strict=False):
             _draw_gains(panel, curve, unit)
         _draw_frequencies(panels[-1], curve)
-        figure.suptitle(shorten(analysis.plant.scene.title, LONGEST_TITLE), x=0.01, ha="left", fontsize=9, parse_math=False)
+        write_title(figure, analysis.plant.scene.title)
         panels[0].set_title("Answer of the tip at rest, by input")
         panels[-1].set_xlabel("depth [mm]")
         for panel in panels:

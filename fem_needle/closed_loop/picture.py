@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from fem_needle.closed_loop.units import shown_unit
-from fem_needle.pictures import COLORS, INK, new_figure, png_bytes, shared_style
+from fem_needle.pictures import COLORS, INK, new_figure, png_bytes, shared_style, write_title
 from fem_needle.scene import Scene
 from fem_needle.scene.signals import INPUT_UNITS
 from fem_needle.trajectory import Trajectory
@@ -21,7 +20,6 @@ Array = NDArray[np.float64]
 
 MILLIMETERS = 1e3
 WIDTH, PANEL_HEIGHT = 8.0, 2.5  # inches
-LONGEST_TITLE = 105  # characters across the picture
 TIP, SEEN, COMMAND, WANTED = COLORS[0], COLORS[1], COLORS[2], COLORS[3]
 AXIAL = ("push_force", "speed")  # inputs that steer the depth
 FAR_LIMIT = 4.0  # times the largest command: a limit beyond is told and not drawn
@@ -113,7 +111,7 @@ def steer_picture(run: Trajectory) -> bytes:
         _draw_error(last, curves)
         last.set_xlabel(curves.along_label)
         figure.align_ylabels()
-        figure.suptitle(shorten(run.scene.title, LONGEST_TITLE), x=0.01, ha="left", fontsize=10, parse_math=False)
+        write_title(figure, run.scene.title)
         return png_bytes(figure)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import chain
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -11,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from fem_needle.closed_loop.picture import LONGEST_TITLE, MILLIMETERS, SEEN, TIP, WANTED
+from fem_needle.closed_loop.picture import MILLIMETERS, SEEN, TIP, WANTED
 from fem_needle.closed_loop.repeated import RepeatedLoop, Repetition
-from fem_needle.pictures import INK, new_figure, png_bytes, shared_style
+from fem_needle.pictures import INK, new_figure, png_bytes, shared_style, write_title
 
 Array = NDArray[np.float64]
 
@@ -43,7 +42,7 @@ def repeated_picture(study: RepeatedLoop) -> bytes:
         _draw_errors(errors, study)
         handles, labels = tips.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
-        figure.suptitle(shorten(study.scene.title, LONGEST_TITLE), x=0.01, ha="left", fontsize=10, parse_math=False)
+        write_title(figure, study.scene.title)
         return png_bytes(figure)
 
 

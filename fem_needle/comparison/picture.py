@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fem_needle.comparison.result import Comparison
 from fem_needle.comparison.runs import ENERGIES
-from fem_needle.pictures import COLORS, INK, MARKERS, new_figure, png_bytes, shared_style
+from fem_needle.pictures import COLORS, INK, MARKERS, new_figure, png_bytes, shared_style, write_title
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,6 @@ CUT = 3.0  # times the reference's largest value: a panel shows no more
 DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)), (0, (3, 3)), (0, (8, 2)))
 ENERGY_COLORS = COLORS[3:6]  # none of those of the first three models
 SMALLEST = 1e-12  # error that is still drawn
-_LONGEST_TITLE = 110
 
 
 def comparison_picture(comparison: Comparison) -> bytes:
@@ -45,13 +44,8 @@ def comparison_picture(comparison: Comparison) -> bytes:
             _draw_tips(axes[-2], comparison)
             _draw_energies(axes[-1], comparison)
         _legend(figure, comparison)
-        figure.suptitle(_title(comparison.scene.title), x=0.01, ha="left", fontsize=11)
+        write_title(figure, comparison.scene.title)
         return png_bytes(figure)
-
-
-def _title(text: str) -> str:
-    text = text if len(text) <= _LONGEST_TITLE else f"{text[: _LONGEST_TITLE - 3]}..."
-    return text.replace("$", r"\$")
 
 
 def _legend(figure: Figure, comparison: Comparison) -> None:

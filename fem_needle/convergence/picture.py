@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fem_needle.convergence.rows import ROUND_OFF, ConvergenceRow
 from fem_needle.convergence.study import ConvergenceStudy
-from fem_needle.pictures import COLORS, INK, MARKERS, new_figure, png_bytes, shared_style
+from fem_needle.pictures import COLORS, INK, MARKERS, TITLE_SIZE, WIDTH, new_figure, png_bytes, shared_style, title_lines
 
 Array = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ MILLISECONDS = 1e3
 LABELS = {"elements": "elements", "modes": "modes", "time-step": "time step [ms]"}
 BESIDE = 0.3  # of the errors: where the slope of theory is drawn, so that neither line hides the other
 GRAY = "#808080"
-_LONGEST_TITLE = 70
+TITLE_SHARE = 0.85  # of the width of the picture
 
 
 def convergence_picture(study: ConvergenceStudy) -> bytes:
@@ -103,9 +103,8 @@ def _label(axes: Axes, study: ConvergenceStudy) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
     if study.over == "time-step":
         axes.invert_xaxis()
-    title = study.scene.title
-    title = title if len(title) <= _LONGEST_TITLE else f"{title[: _LONGEST_TITLE - 3]}..."
-    axes.set_title("\n".join((title, study.reference)).replace("$", r"\$"), loc="left", fontsize=10)
+    title = title_lines(study.scene.title, TITLE_SHARE * WIDTH)
+    axes.set_title("\n".join((title, study.reference)), loc="left", fontsize=TITLE_SIZE, parse_math=False)
 
 
 def _apart(places: list[float], smallest_ratio: float = 1.25) -> list[float]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -11,14 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fem_needle.pictures import INK
+from fem_needle.pictures import INK, write_title
 from fem_needle.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
 MILLIMETERS = 1e3
 SMALL = 8.5  # points: the smallest letters of a picture
-LONGEST_TITLE = 100  # characters across a picture
 SAME_DEPTH = 1e-9  # of the needle's length: what a held depth may differ by
 MARGIN = 0.08  # of the range of values, above and below
 LEAST_RANGE = 1e-9  # of the needle's length: deflections below it are drawn as zero
@@ -31,8 +29,7 @@ def name_figure(figure: Figure, run: Trajectory) -> None:
     """Write the title of the scene above everything, and how the run ended where it did not end as it should."""
     reason = run.summary.get("stop_reason")
     ending = f" ({reason} at {run.time[-1]:.3g} s)" if reason in FAILURES else ""
-    title = shorten(run.scene.title or "Run without a title", LONGEST_TITLE - len(ending), placeholder=" ...") + ending
-    figure.suptitle(title, x=0.01, ha="left", fontsize=10, parse_math=False)
+    write_title(figure, run.scene.title or "Run without a title", ending)
 
 
 def moves(run: Trajectory) -> bool:

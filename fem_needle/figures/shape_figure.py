@@ -20,6 +20,7 @@ from fem_needle.trajectory import Trajectory
 WIDTH, HEIGHT = 9.0, 4.8  # inches
 AXES_WIDTH = 470.0  # points, about
 SHOWN = 5  # shapes, where no depths are given
+MISSED = 1.05  # how many times as large as those shown a deflection is that is shown as well
 DARKEST, BRIGHTEST = 0.0, 0.85  # of the map viridis: its yellow is too bright for a line
 
 
@@ -31,8 +32,8 @@ def shapes(run: Trajectory, depths: Sequence[float] | None = None) -> Figure:
     run
         Computed or loaded.
     depths
-        z [m], each shown at the sample next to it, the first time; default: five over the range, or of a needle that is
-        held five instants.
+        z [m], each shown at the sample next to it, the first time; default: five over the range and that of the largest
+        deflection where it exceeds them, or of a needle that is held five instants.
 
     Returns
     -------
@@ -63,8 +64,11 @@ def _default_rows(run: Trajectory) -> NDArray[np.intp]:
     if not moves(run):
         return np.unique(np.linspace(0, len(run.time) - 1, SHOWN).astype(np.intp))
     wanted = np.linspace(float(np.min(run.depth)), float(np.max(run.depth)), SHOWN)
-    nearest = [_row_at(run, depth) for depth in wanted]
-    return np.unique([*nearest, len(run.time) - 1] if run.depth[-1] < wanted[-2] else nearest)
+    rows = [_row_at(run, depth) for depth in wanted]
+    rows += [len(run.time) - 1] if run.depth[-1] < wanted[-2] else []
+    sizes = np.max(np.abs(np.nan_to_num(run.station_deflection)), axis=1)
+    most = int(np.argmax(sizes))
+    return np.unique([*rows, most] if sizes[most] > MISSED * np.max(sizes[rows]) else rows)
 
 
 def _row_at(run: Trajectory, depth: float) -> int:

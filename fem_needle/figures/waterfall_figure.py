@@ -20,6 +20,7 @@ CURVES = 24  # at most, stacked
 MOST_CELLS = 400  # of the map, along each side
 MOST_INTERFACES = 12  # that are drawn
 OVERLAP = 2.5  # spacings of two curves that the largest deflection takes
+NO_TIME = "#ececec"  # beside the map, where a white place would be a needle at rest
 MAP = "RdBu_r"  # white at zero, told apart by color-blind readers
 
 
@@ -47,8 +48,9 @@ def waterfall(run: Trajectory) -> Figure:
         _draw_map(figure, right, run, largest)
         for axes in (left, right):
             axes.set(xlim=(0.0, MILLIMETERS * run.arc_length[-1]), xlabel="arc length [mm], hub to tip")
-        right.set_ylim(low, high)
-        left.set_ylabel("time [s]")
+            axes.set(ylim=left.get_ylim(), ylabel="time [s]")
+            axes.set_yticks([tick for tick in axes.get_yticks() if low <= tick <= high])
+        right.set_facecolor(NO_TIME)
         figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=SMALL + 0.5)
         name_figure(figure, run)
     return figure
@@ -82,7 +84,8 @@ def _draw_curves(axes: Axes, run: Trajectory, largest: float, duration: float) -
     space = 0.02 * duration
     top, size = max(high, float(np.max(shapes))) + space, _round_number(largest) if stretch else 0.0
     axes.set_ylim(min(low, float(np.min(shapes))) - space, top + stretch * size + space * bool(stretch))
-    axes.set_title("Deflection, stacked", loc="left")
+    count = len(run.time)
+    axes.set_title("Stacked" if len(rows) == count else f"Stacked: {len(rows)} of {count} samples", loc="left")
     axes.grid(False)
     if stretch:
         _draw_scale(axes, size, (top, top + stretch * size))

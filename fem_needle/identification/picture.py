@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from fem_needle.identification.result import Identification
-from fem_needle.pictures import COLORS, INK, MARKERS, new_figure, png_bytes, shared_style
+from fem_needle.pictures import COLORS, INK, MARKERS, new_figure, png_bytes, shared_style, write_title
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,6 @@ MILLIMETERS = 1e3
 NAMES = {"m": "deflection [mm]", "N": "push [N]"}
 BAND = "#c8c8c8"
 MOST_NAMED = 8  # series in a legend
-_LONGEST_TITLE = 70
 
 
 def identification_picture(found: Identification) -> bytes:
@@ -31,9 +30,7 @@ def identification_picture(found: Identification) -> bytes:
         grid = figure.subplots(2, len(units), sharex="col", squeeze=False, height_ratios=(2.2, 1.0))
         for number, unit in enumerate(units):
             _draw(grid[0, number], grid[1, number], found, unit)
-        title = found.scene.title
-        title = title if len(title) <= _LONGEST_TITLE else f"{title[: _LONGEST_TITLE - 3]}..."
-        figure.suptitle(title.replace("$", r"\$"), x=0.01, ha="left", fontsize=11)
+        write_title(figure, found.scene.title)
         return png_bytes(figure)
 
 

@@ -202,6 +202,37 @@ def test_the_waterfall_is_the_deflection_over_arc_length_and_time():
     assert left.get_ylabel() == "time [s]"
 
 
+@pytest.mark.parametrize("name", ["hub", "hold"])
+def test_both_halves_of_the_waterfall_have_the_same_times_and_no_ticks_beyond_the_run(name):
+    run = run_named(name)
+    left, right = waterfall(run).axes[:2]
+    assert left.get_ylim() == right.get_ylim() and left.get_ylabel() == right.get_ylabel() == "time [s]"
+    for axes in (left, right):
+        ticks = axes.get_yticks()
+        assert len(ticks) > 2 and run.time[0] <= min(ticks) and max(ticks) <= run.time[-1]
+
+
+def test_the_waterfall_says_how_many_samples_are_stacked():
+    run = run_named("hub")
+    assert waterfall(run).axes[0].get_title(loc="left") == "Stacked"
+    many = replace(run, time=np.linspace(0.0, 1.0, 400), station_deflection=np.resize(run.station_deflection, (400, 3)),
+                   arc_length=run.arc_length[:3], series={name: np.resize(v, 400) for name, v in run.series.items()})  # fmt: skip
+    assert waterfall(many).axes[0].get_title(loc="left") == "Stacked: 24 of 400 samples"
+
+
+def test_the_largest_deflection_of_a_run_is_among_the_shapes():
+    run = run_named("hub")
+    row = int(np.argmax(np.max(np.abs(run.station_deflection), axis=1)))
+    assert f"{1e3 * run.depth[row]:.4g} mm deep" in lines(shapes(run).axes[1])
+
+
+def test_long_titles_have_two_lines_and_lose_no_words():
+    title = load_scene("liver-push").title
+    run = run_named("interrupted")
+    shown = courses(replace(run, scene=run.scene.with_values({"title": title}))).get_suptitle()
+    assert " ".join(shown.split()).startswith(title) and shown.count("\n") == 1 and "(interrupted at " in shown
+
+
 def test_the_bar_of_the_stacked_curves_has_the_length_that_it_tells():
     run = run_named("hub")
     left = waterfall(run).axes[0]
