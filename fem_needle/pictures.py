@@ -22,7 +22,7 @@ DASHES: Any = ("-", (0, (5, 2)), (0, (1.5, 1.5)), (0, (6, 1.5, 1.5, 1.5)), (0, (
 SHADES = ("#f4e3d2", "#e3bfa6", "#eddcb4", "#d9c3c8", "#f1d5c4", "#dcc9a9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 TITLE_SIZE = 10.0  # points
-LETTER = 0.58  # width of a letter over its height, on average
+LETTER = 0.55  # width of a letter over its height, on average
 POINTS = 72.0  # of an inch
 MOST_TURNS = 80  # of a curve: beyond, dashes merge into a band
 STYLE: Any = {
@@ -61,7 +61,7 @@ def new_figure(width: float = WIDTH, height: float = HEIGHT) -> Figure:
 def title_lines(title: str, width: float) -> str:
     """Return a title in one or two lines that fit a width [inches]; what two do not hold ends in "..."."""
     most = int(POINTS * width / (LETTER * TITLE_SIZE))
-    return "\n".join(wrap(title, most, max_lines=2, placeholder=" ..."))
+    return "\n".join(wrap(title, most, max_lines=2, placeholder=" ...", break_on_hyphens=False))
 
 
 def write_title(figure: Figure, title: str, ending: str = "") -> None:

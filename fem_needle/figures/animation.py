@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from fem_needle.figures.common import MILLIMETERS, SMALL, name_figure, placed
+from fem_needle.figures.common import MILLIMETERS, SMALL, deflection_unit, name_figure, placed
 from fem_needle.figures.scenery import PATH, draw_scenery, magnification, set_limits, told
 from fem_needle.figures.tissue import figure_with_tissue
 from fem_needle.pictures import COLORS, INK, new_figure, shared_style
@@ -78,7 +78,7 @@ def _prepare(figure: Figure, axes: Axes, strip: Axes, run: Trajectory) -> tuple[
     figure.legend(loc="outside right center", frameon=False, fontsize=SMALL + 0.5)
     name_figure(figure, run)
     strip.set_title("t = 0 s", loc="left")
-    text = told(run, magnification(figure, axes))
+    text = told(run, magnification(figure, axes, run))
     figure.set_layout_engine("none")
     return lines, text
 
@@ -89,7 +89,7 @@ def _show(lines: list[Line2D], strip: Axes, run: Trajectory, row: int, magnified
     needle, tip, way, *hub = lines
     needle.set_data(along, across)
     tip.set_data(along[-1:], across[-1:])
-    way.set_data(MILLIMETERS * run.depth[: row + 1], MILLIMETERS * run.tip_deflection[: row + 1])
+    way.set_data(MILLIMETERS * run.depth[: row + 1], deflection_unit(run)[0] * run.tip_deflection[: row + 1])
     if hub:
         hub[0].set_data(along[:1], across[:1])
     for marker, (y, force) in zip(hub[1:], lateral_forces(run, row), strict=True):

@@ -21,6 +21,8 @@ SAME_DEPTH = 1e-9  # of the needle's length: what a held depth may differ by
 MARGIN = 0.08  # of the range of values, above and below
 LEAST_RANGE = 1e-9  # of the needle's length: deflections below it are drawn as zero
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"), (1e-15, "f"), (1e-18, "a"))
+LENGTHS = ((1e3, "mm"), (1e6, "µm"), (1e9, "nm"), (1e12, "pm"))  # of a meter, and the unit
+LEAST_SHOWN = 0.01  # of a unit, that deflections are shown in
 FAILURES = ("failed", "unstable", "interrupted")
 ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2, "frameon": False}
 
@@ -38,7 +40,7 @@ def moves(run: Trajectory) -> bool:
 
 
 def placed(run: Trajectory, row: int) -> tuple[Array, Array]:
-    """Return places y and deflections [mm] of the needle at a sample, shape (n,) each, from the hub to the tip.
+    """Return places y [mm] and deflections [`deflection_unit`] of the needle at a sample, (n,) each, from the hub to the tip.
 
     Under ``entry`` the place where the needle enters is among them.
     """
@@ -47,13 +49,27 @@ def placed(run: Trajectory, row: int) -> tuple[Array, Array]:
     if run.scene.support.kind == "entry":
         index = int(np.searchsorted(along, 0.0))
         along, across = np.insert(along, index, 0.0), np.insert(across, index, 0.0)
-    return MILLIMETERS * along, MILLIMETERS * across
+    return MILLIMETERS * along, deflection_unit(run)[0] * across
 
 
 def largest_deflection(run: Trajectory) -> float:
     """Return the largest magnitude of all deflections [m] that are finite."""
     finite = run.station_deflection[np.isfinite(run.station_deflection)]
     return float(np.max(np.abs(finite), initial=0.0))
+
+
+def deflection_unit(run: Trajectory) -> tuple[float, str]:
+    """Return the unit in which a picture shows deflections: how many of it a meter is, and its name; mm unless all are tiny."""
+    target = run.scene.target
+    wanted = 0.0 if target.depth is None else abs(target.lateral)
+    return length_unit(max(largest_deflection(run), wanted), run.scene.needle.length)
+
+
+def length_unit(largest: float, length: float) -> tuple[float, str]:
+    """Return the same for a largest deflection [m] of a needle of a length [m]."""
+    if largest <= LEAST_RANGE * length:
+        return LENGTHS[0]
+    return next((pair for pair in LENGTHS if largest * pair[0] >= LEAST_SHOWN), LENGTHS[-1])
 
 
 def limits_of(values: Array, least: float) -> tuple[float, float]:

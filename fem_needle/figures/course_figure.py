@@ -15,6 +15,7 @@ from fem_needle.figures.common import (
     ABOVE,
     MILLIMETERS,
     SMALL,
+    deflection_unit,
     draw_zero,
     limits_of,
     lone_marker,
@@ -99,10 +100,11 @@ def draw_panel(axes: Axes, panel: Panel, run: Trajectory) -> None:
 
 
 def _panels(run: Trajectory) -> tuple[Panel, ...]:
+    unit, name = deflection_unit(run)
     hub = {} if _all_zero(run.hub_force) else {"hub" if run.scene.support.kind == "hub" else "clamp": run.hub_force}
     lateral = {"tissue": run.tissue_force} | hub | _guides(run)
     return (
-        Panel("Tip", "tip [mm]", {"deflection": MILLIMETERS * run.tip_deflection}),
+        Panel("Tip", f"tip [{name}]", {"deflection": unit * run.tip_deflection}),
         Panel("Insertion", "depth [mm]", {"depth": MILLIMETERS * run.depth}),
         _forces("Axial: push and what resists it", axial_forces(run)),
         _forces("Lateral forces on the needle", lateral),

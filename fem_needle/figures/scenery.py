@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fem_needle.figures.common import LEAST_RANGE, MILLIMETERS, largest_deflection, limits_of, placed
+from fem_needle.figures.common import LEAST_RANGE, MILLIMETERS, deflection_unit, largest_deflection, limits_of, placed
 from fem_needle.figures.tissue import draw_tissue
 from fem_needle.pictures import COLORS, INK
 from fem_needle.run_forces import lateral_forces
@@ -32,8 +32,11 @@ def set_limits(axes: Axes, run: Trajectory, rows: NDArray[np.intp]) -> None:
 
 
 def limits(run: Trajectory, rows: NDArray[np.intp]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return limits [mm] along and across that hold the needle at all given samples, its guides, the target, the cut path."""
-    scene, shown = run.scene, [placed(run, int(row)) for row in rows]
+    """Return limits, along [mm] and across [`deflection_unit`], that hold what is drawn.
+
+    That is the needle at all given samples, its guides, the target and the cut path.
+    """
+    scene, shown, unit = run.scene, [placed(run, int(row)) for row in rows], deflection_unit(run)[0]
     deepest = max(float(along[-1]) for along, _ in shown)
     first = min(float(along[0]) for along, _ in shown)
     if scene.support.kind == "entry":
@@ -42,17 +45,17 @@ def limits(run: Trajectory, rows: NDArray[np.intp]) -> tuple[tuple[float, float]
     across = [values for _, values in shown]
     if scene.target.depth is not None:
         places.append(MILLIMETERS * scene.target.depth)
-        across.append(np.array([MILLIMETERS * scene.target.lateral]))
+        across.append(np.array([unit * scene.target.lateral]))
     if len(run.path_position):
-        across.append(MILLIMETERS * run.path_deflection)
+        across.append(unit * run.path_deflection)
     space = SPACE * (max(places) - min(places))
-    least = LEAST_RANGE * MILLIMETERS * scene.needle.length
+    least = LEAST_RANGE * unit * scene.needle.length
     return (min(places) - space, max(places) + space), limits_of(np.concatenate(across), least)
 
 
 def draw_scenery(axes: Axes, strip: Axes, run: Trajectory, width: float) -> None:
     """Draw the axis, tissue, guides, target and cut path inside the limits; ``width`` of the axes [points], about."""
-    scene = run.scene
+    scene, (unit, name) = run.scene, deflection_unit(run)
     draw_tissue(axes, strip, scene, width)
     axes.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (6, 4)), zorder=1)
     for kind, places in guides_of(run).items():
@@ -61,9 +64,9 @@ def draw_scenery(axes: Axes, strip: Axes, run: Trajectory, width: float) -> None
         axes.plot([0.0], [0.0], **_point("s", COLORS[4]), label="clamp at the skin")
     if len(run.path_position):
         style: dict[str, Any] = {"color": PATH, "linestyle": (0, (1.5, 1.5)), "linewidth": 1.8, "zorder": 2.5}
-        axes.plot(MILLIMETERS * run.path_position, MILLIMETERS * run.path_deflection, label="path that the tip cut", **style)
+        axes.plot(MILLIMETERS * run.path_position, unit * run.path_deflection, label="path that the tip cut", **style)
     draw_target(axes, run)
-    axes.set(xlabel="place along the insertion axis y [mm], 0 at the skin", ylabel="deflection [mm]")
+    axes.set(xlabel="place along the insertion axis y [mm], 0 at the skin", ylabel=f"deflection [{name}]")
 
 
 def guides_of(run: Trajectory) -> dict[str, list[float]]:
@@ -79,7 +82,8 @@ def draw_target(axes: Axes, run: Trajectory) -> None:
     """Draw where a closed loop is to bring the tip."""
     target = run.scene.target
     if target.depth is not None:
-        axes.plot([MILLIMETERS * target.depth], [MILLIMETERS * target.lateral], **_point("D", WANTED), label="target")
+        place = ([MILLIMETERS * target.depth], [deflection_unit(run)[0] * target.lateral])
+        axes.plot(*place, **_point("D", WANTED), label="target")
 
 
 def _point(marker: str, color: str) -> dict[str, Any]:
@@ -103,11 +107,11 @@ def draw_forces(axes: Axes, run: Trajectory, row: int, label: str) -> bool:
     return drawn
 
 
-def magnification(figure: Figure, axes: Axes) -> float:
+def magnification(figure: Figure, axes: Axes, run: Trajectory) -> float:
     """Return by how much the figure stretches deflections more than lengths along the axis, once it is laid out."""
     figure.draw_without_rendering()
     (left, bottom), (right, top) = axes.transData.transform([(0.0, 0.0), (1.0, 1.0)])
-    return float((top - bottom) / (right - left))
+    return float((top - bottom) / (right - left)) * deflection_unit(run)[0] / MILLIMETERS
 
 
 def told(run: Trajectory, factor: float) -> str:

@@ -55,7 +55,7 @@ def shapes(run: Trajectory, depths: Sequence[float] | None = None) -> Figure:
         figure.legend(loc="outside right center", frameon=False, fontsize=SMALL + 0.5)
         name_figure(figure, run)
         strip.set_title("Shapes, deflections magnified 0 times", loc="left")
-        strip.set_title(f"Shapes, {told(run, magnification(figure, axes))}", loc="left")
+        strip.set_title(f"Shapes, {told(run, magnification(figure, axes, run))}", loc="left")
     return figure
 
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fem_needle.figures.common import LEAST_RANGE, MILLIMETERS, SMALL, largest_deflection, moves, name_figure
+from fem_needle.figures.common import LEAST_RANGE, MILLIMETERS, SMALL, deflection_unit, largest_deflection, moves, name_figure
 from fem_needle.pictures import COLORS, INK, new_figure, shared_style
 from fem_needle.trajectory import Trajectory
 
@@ -40,8 +40,8 @@ def waterfall(run: Trajectory) -> Figure:
     with shared_style():
         figure = new_figure(WIDTH, HEIGHT)
         left, right = figure.subplots(1, 2, sharex=True)
-        largest = MILLIMETERS * largest_deflection(run)
-        if largest <= LEAST_RANGE * MILLIMETERS * run.scene.needle.length:
+        largest = deflection_unit(run)[0] * largest_deflection(run)
+        if largest <= LEAST_RANGE * deflection_unit(run)[0] * run.scene.needle.length:
             largest = 0.0
         low, high = _time_limits(run)
         _draw_curves(left, run, largest, high - low)
@@ -69,10 +69,11 @@ def _thinned(count: int, most: int) -> NDArray[np.intp]:
 def _draw_curves(axes: Axes, run: Trajectory, largest: float, duration: float) -> None:
     """Draw shapes, each on the line of its time; filled from below, so that the earlier ones stand in front."""
     rows, along = _thinned(len(run.time), CURVES), MILLIMETERS * run.arc_length
+    unit, name = deflection_unit(run)
     stretch = OVERLAP * duration / max(len(rows), 8) / largest if largest else 0.0
     for order, row in enumerate(rows):
         base = float(run.time[row])
-        curve = base + stretch * MILLIMETERS * run.station_deflection[row]
+        curve = base + stretch * unit * run.station_deflection[row]
         front = 3.0 - 0.01 * order
         axes.plot(along[[0, -1]], [base, base], color="#c8c8c8", linewidth=0.5, zorder=1)
         axes.plot(along, curve, color=COLORS[0], linewidth=1.2, zorder=front)
@@ -80,7 +81,7 @@ def _draw_curves(axes: Axes, run: Trajectory, largest: float, duration: float) -
         axes.plot(*_skin(run), color=INK, linestyle=(0, (5, 2)), linewidth=1.4, zorder=4)
     low, high = _time_limits(run)
     deflections = run.station_deflection[rows]
-    shapes = run.time[rows, None] + stretch * MILLIMETERS * np.where(np.isfinite(deflections), deflections, 0.0)
+    shapes = run.time[rows, None] + stretch * unit * np.where(np.isfinite(deflections), deflections, 0.0)
     space = 0.02 * duration
     top, size = max(high, float(np.max(shapes))) + space, _round_number(largest) if stretch else 0.0
     axes.set_ylim(min(low, float(np.min(shapes))) - space, top + stretch * size + space * bool(stretch))
@@ -88,16 +89,16 @@ def _draw_curves(axes: Axes, run: Trajectory, largest: float, duration: float) -
     axes.set_title("Stacked" if len(rows) == count else f"Stacked: {len(rows)} of {count} samples", loc="left")
     axes.grid(False)
     if stretch:
-        _draw_scale(axes, size, (top, top + stretch * size))
+        _draw_scale(axes, f"{size:g} {name}", (top, top + stretch * size))
 
 
-def _draw_scale(axes: Axes, size: float, ends: tuple[float, float]) -> None:
-    """Say above the stacked curves how long a deflection [mm] is on them, by a bar between two times [s]."""
+def _draw_scale(axes: Axes, size: str, ends: tuple[float, float]) -> None:
+    """Say above the stacked curves how long a deflection is on them, by a bar between two times [s]."""
     transform = axes.get_yaxis_transform()
     bar: dict[str, Any] = {"arrowstyle": "|-|,widthA=0.25,widthB=0.25", "color": COLORS[1], "linewidth": 1.6}
     bar |= {"shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (0.04, ends[1]), (0.04, ends[0]), xycoords=transform, textcoords=transform, arrowprops=bar)
-    axes.annotate(f"{size:g} mm", (0.07, sum(ends) / 2.0), xycoords=transform, va="center", fontsize=SMALL + 0.5)
+    axes.annotate(size, (0.07, sum(ends) / 2.0), xycoords=transform, va="center", fontsize=SMALL + 0.5)
 
 
 def _round_number(value: float) -> float:
@@ -108,7 +109,8 @@ def _round_number(value: float) -> float:
 
 def _draw_map(figure: Figure, axes: Axes, run: Trajectory, largest: float) -> None:
     rows, columns = _thinned(len(run.time), MOST_CELLS), _thinned(len(run.arc_length), MOST_CELLS)
-    values = MILLIMETERS * run.station_deflection[np.ix_(rows, columns)]
+    unit, name = deflection_unit(run)
+    values = unit * run.station_deflection[np.ix_(rows, columns)]
     limit = largest or 1.0
     edges = (MILLIMETERS * _edges(run.arc_length[columns]), _edges(run.time[rows]))
     cells = axes.pcolormesh(*edges, values, cmap=MAP, vmin=-limit, vmax=limit, rasterized=True, zorder=1)
@@ -120,7 +122,7 @@ def _draw_map(figure: Figure, axes: Axes, run: Trajectory, largest: float) -> No
         axes.axvline(place, color=INK, linestyle=(0, (5, 2)), linewidth=1.4, label="skin", zorder=4)
     axes.grid(False)
     axes.set_title("Deflection, as a map" if largest else "Deflection, zero throughout", loc="left")
-    figure.colorbar(cells, ax=axes, label="deflection [mm]")
+    figure.colorbar(cells, ax=axes, label=f"deflection [{name}]")
 
 
 def _draw_interfaces(axes: Axes, run: Trajectory) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fem_needle.closed_loop.units import shown_unit
 from fem_needle.figures import courses, energies, shapes
-from fem_needle.figures.common import MILLIMETERS, placed, suited
+from fem_needle.figures.common import MILLIMETERS, deflection_unit, placed, suited
 from fem_needle.figures.course_figure import axial_forces
 from fem_needle.figures.energy_figure import LEDGER, ledger_terms
 from fem_needle.figures.scenery import ON_A_SPRING, RIGID, WANTED, guides_of, limits
@@ -61,7 +61,7 @@ def _needle_figure(run: Trajectory, rows: NDArray[np.intp]) -> go.Figure:
     (low, high), across = limits(run, rows)
     straight = {"color": INK, "width": 1, "dash": "dash"}
     axis = go.Scatter(x=[low, high], y=[0.0, 0.0], mode="lines", line=straight, hoverinfo="skip", showlegend=False)
-    figure = panels_figure([Panel("deflection [mm]", ())], "place along the axis [mm]")
+    figure = panels_figure([Panel(f"deflection [{deflection_unit(run)[1]}]", ())], "place along the axis [mm]")
     figure.add_traces([axis, _needle_line(*lines[-1]), *_points(run)])
     figure.frames = [
         go.Frame(data=[_needle_line(*line)], traces=[1], name=str(index)) for index, line in enumerate(lines)
@@ -111,7 +111,7 @@ def _points(run: Trajectory) -> list[go.Scatter]:
     target = run.scene.target
     points = [_point(*SYMBOLS[kind][:2], kind, places, [0.0] * len(places)) for kind, places in guides_of(run).items()]
     if target.depth is not None:
-        points.append(_point(*TARGET[:2], "target", [MILLIMETERS * target.depth], [MILLIMETERS * target.lateral]))
+        points.append(_point(*TARGET[:2], "target", [MILLIMETERS * target.depth], [deflection_unit(run)[0] * target.lateral]))
     return points
 
 
@@ -136,8 +136,9 @@ def _needle_caption(run: Trajectory) -> str:
 
 def course_chart(run: Trajectory) -> Chart:
     """Return tip, depth, forces and the commands of a loop over time."""
+    unit, name = deflection_unit(run)
     panels = [
-        Panel("tip [mm]", (_over_time(run, "tip deflection", MILLIMETERS * run.tip_deflection),)),
+        Panel(f"tip [{name}]", (_over_time(run, "tip deflection", unit * run.tip_deflection),)),
         Panel("depth [mm]", (_over_time(run, "depth", MILLIMETERS * run.depth),)),
         _suited(run, "axial force", "N", axial_forces(run)),
         _suited(run, "lateral force", "N", _lateral(run)),

@@ -12,6 +12,7 @@ from matplotlib.text import Text
 
 from fem_needle import SceneError, Trajectory, load_scene, run_scene
 from fem_needle.figures import courses, energies, shapes, tip_path, waterfall
+from fem_needle.figures.common import deflection_unit
 from fem_needle.figures.course_figure import Panel, draw_panel
 from fem_needle.figures.tissue import bands_of
 from fem_needle.pictures import crowded
@@ -224,6 +225,23 @@ def test_the_largest_deflection_of_a_run_is_among_the_shapes():
     run = run_named("hub")
     row = int(np.argmax(np.max(np.abs(run.station_deflection), axis=1)))
     assert f"{1e3 * run.depth[row]:.4g} mm deep" in lines(shapes(run).axes[1])
+
+
+def test_tiny_deflections_have_a_unit_in_which_numbers_need_no_power_of_ten():
+    """A run made a hundred thousand times as flat: nanometers in all pictures, magnified by as much more."""
+    run = run_named("hub")
+    shapes_small = 1e-5 * run.station_deflection
+    flat = replace(run, station_deflection=shapes_small, series=run.series | {"tip_deflection": shapes_small[:, -1]})
+    assert deflection_unit(run) == (1e3, "mm") and deflection_unit(flat) == (1e9, "nm")
+    for figure in (shapes(flat), tip_path(flat), courses(flat), waterfall(flat)):
+        figure.draw_without_rendering()
+        labels = " ".join(axes.get_ylabel() for axes in figure.axes)
+        assert "[nm]" in labels
+        assert [axes.yaxis.get_offset_text().get_text() for axes in figure.axes] == [""] * len(figure.axes)
+    told = [float(re.findall(r"magnified (\S+) times", shapes(one).axes[0].get_title(loc="left"))[0]) for one in (run, flat)]
+    assert told[1] == pytest.approx(1e5 * told[0], rel=0.05)
+    tip = lines(tip_path(flat).axes[1])["tip"]
+    np.testing.assert_allclose(tip.get_ydata(), 1e9 * flat.tip_deflection)
 
 
 def test_long_titles_have_two_lines_and_lose_no_words():
