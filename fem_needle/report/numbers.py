@@ -81,11 +81,6 @@ def tidy(text: str) -> str:
     return _EXPONENT.sub(lambda found: number(float(found[0])) if abs(float(found[0])) < PLAIN[0] else found[0], text)
 
 
-def modulus(value: float) -> str:
-    """Return a foundation modulus [N/m^2] as a text in kN/m²."""
-    return with_unit(number(value / KILO), "kN/m^2")
-
-
 def ratio(value: float | None) -> str:
     """Return a share with two digits: a percentage, a power of ten where it is small."""
     if value is None or not isfinite(value):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import pi
+from math import isfinite, pi
 from typing import Any
 
-from fem_needle.report.numbers import number, ratio
+from fem_needle.report.numbers import MISSING, PLAIN, number, with_unit
 from fem_needle.report.parts import Chart, Grid
 
 Columns = Mapping[str, Sequence[str]]
@@ -76,5 +76,8 @@ def hertz(value: float | None) -> str:
 
 
 def share(value: float | None) -> str:
-    """Return a share; "none" where it is missing or infinite."""
-    return ratio(value)
+    """Return a share as a percentage, so that those of a column compare at a glance; "none" where it is missing or infinite."""
+    if value is None or not isfinite(value):
+        return MISSING
+    percent = 100.0 * value
+    return with_unit(number(percent, 2) if percent == 0.0 or abs(percent) >= PLAIN[0] else f"below {PLAIN[0]:g}", "%")

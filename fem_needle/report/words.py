@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from fem_needle.closed_loop.steering import described
 from fem_needle.layer_names import layer_name, numbered_layers
-from fem_needle.report.numbers import KILO, millimeters, modulus, number, quantity, ratio, varying, with_unit
+from fem_needle.report.numbers import KILO, millimeters, number, quantity, ratio, varying, with_unit
 from fem_needle.report.parts import Grid
 from fem_needle.scene import Guide, LateralLoad, Scene, TipLoad
 
@@ -44,7 +44,7 @@ def layer_grids(scene: Scene) -> tuple[Grid, ...]:
         "layer": [layer_name(number, layer) for number, layer in numbered],
         "from": [millimeters(layer.start) for layer in layers],
         "to": ["no far side" if layer.end is None else millimeters(layer.end) for layer in layers],
-        "foundation modulus": [modulus(layer.foundation_modulus) for layer in layers],
+        "foundation modulus": [quantity(layer.foundation_modulus, "N/m^2") for layer in layers],
     }
     if any(layer.damping for layer in layers):
         columns["damping"] = [with_unit(number(layer.damping), "N s/m^2") for layer in layers]

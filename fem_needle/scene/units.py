@@ -38,6 +38,9 @@ _SYMBOLS: dict[str, tuple[float, Dimension]] = {
 # The exact decimal powers, so that "127 mm" is 0.127 to the last bit.
 _DIVISORS = {1e-2: 1e2, 1e-3: 1e3, 1e-6: 1e6, 1e-9: 1e9}
 
+# Units of tables and pictures that are not those with millimeters in place of meters.
+_DISPLAYED = {"Pa": "GPa", "rad": "deg", "N/m^2": "kN/m^2", "N s/m^2": "N s/m^2"}
+
 _NAMES: dict[Dimension, str] = {
     (0, 0, 0, 0): "plain number",
     (0, 1, 0, 0): "length",
@@ -185,10 +188,5 @@ def to_si(text: str, unit: str) -> float:
 
 
 def display_unit(unit: str) -> str:
-    """Return the unit for tables and pictures: millimeter, newton, second, degree.
-
-    ``N/m^2`` becomes ``N/mm^2``; a pascal is written as ``N/mm^2``.
-    """
-    if unit in ("Pa", "rad"):
-        return {"Pa": "N/mm^2", "rad": "deg"}[unit]
-    return re.sub(r"\bm\b", "mm", unit)
+    """Return the unit for tables and pictures: millimeter, newton, second, degree, and for moduli what people type."""
+    return _DISPLAYED.get(unit) or re.sub(r"\bm\b", "mm", unit)

@@ -52,8 +52,8 @@ def test_two_moduli_from_the_sample(command, tmp_path):
     fitted = load_scene(folder / "fitted.toml")
     assert [layer.foundation_modulus for layer in fitted.tissue.layers] == [one["value"] for one in data["parameters"]]
     shown = {words[0]: words for words in (line.split() for line in out.splitlines()) if words}
-    assert shown[MODULI[1]][1] == f"{1e-6 * data['parameters'][1]['value']:.5g}"
-    assert shown[MODULI[1]][-1] == "N/mm^2"
+    assert shown[MODULI[1]][1] == f"{1e-3 * data['parameters'][1]['value']:.5g}"
+    assert shown[MODULI[1]][-1] == "kN/m^2"
     assert "residuals: like random noise" in out
     assert "prediction: 5 rows held back" in out
     assert "files: runs/brachytherapy-identify" in out

@@ -61,7 +61,7 @@ def test_check_shows_si_and_millimeters(run):
     rows = {line.split()[0]: " ".join(line.split()[1:]) for line in out.splitlines() if line.strip()}
     assert rows["needle.length"] == "0.2 m 200 mm"
     assert rows["needle.bending_stiffness"] == "0.0157222 N m^2 15722.2 N mm^2"
-    assert rows["tissue.layers.1.foundation_modulus"] == "20000 N/m^2 0.02 N/mm^2"
+    assert rows["tissue.layers.1.foundation_modulus"] == "20000 N/m^2 20 kN/m^2"
     assert rows["loads.0.force"] == "0 to 0.5 N (table of 4 points)"
     assert rows["support.guides.0.stiffness"] == "rigid"
     assert rows["run.duration"] == "9.5 s (until the insertion ends) 9.5 s"

@@ -131,8 +131,8 @@ def check_analyze(page, data):
 
 def check_identify(page, data):
     [row] = cells(page, "Fitted values")
-    assert row[0] == FIT and row[4] == "N/mm²"
-    assert float(row[1]) == pytest.approx(1e-6 * data["parameters"][0]["value"], rel=1e-3)
+    assert row[0] == FIT and row[4] == "kN/m²"
+    assert float(row[1]) == pytest.approx(1e-3 * data["parameters"][0]["value"], rel=1e-3)
     assert len(next(trace for trace in curves(page) if trace.name == "measured").y) == data["rows"]
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from fem_needle import load_scene
-from fem_needle.report.numbers import duration, instant, millimeters, modulus, number, quantity, ratio, tidy, varying, with_unit
+from fem_needle.report.numbers import duration, instant, millimeters, number, quantity, ratio, tidy, varying, with_unit
 from fem_needle.report.shared import values_section
+from fem_needle.report.study_parts import share
 from fem_needle.report.words import layer_grids, scene_words
 from fem_needle.scene import (
     Friction,
@@ -54,7 +55,7 @@ def test_quantities_are_in_mm_n_s_and_degrees():
     assert plain(millimeters(4.6e-29)) == "0 mm" and plain(millimeters(-2e-14)) == "−2 × 10⁻¹¹ mm"
     assert plain(quantity(np.pi, "rad")) == "180 deg"
     assert plain(quantity(0.0256, "N m^2")) == "25600 N mm²"
-    assert plain(modulus(520.0)) == "0.52 kN/m²"
+    assert plain(quantity(520.0, "N/m^2")) == "0.52 kN/m²"
     times = (2.0, 3e-3, 4e-6, 5e-9, 0.0, None)
     assert [plain(duration(value)) for value in times] == ["2 s", "3 ms", "4 µs", "5 ns", "0 s", "none"]
     assert [plain(ratio(value)) for value in (0.0123, 1e-3, 2.54e-5, None, float("inf"))] == [
@@ -156,3 +157,11 @@ def test_every_shipped_scene_has_sentences_and_all_its_values(name):
     shown = {row[0] for grid in values_section(scene).grids for row in grid.rows}
     parts = {"target", "controller", "actuators", "scatter", "title"}
     assert {path for path, _, _ in entries(scene) if path.partition(".")[0] not in parts} <= shown
+
+
+SHARES = [(0.274, "27 %"), (1.2e-4, "0.012 %"), (3e-9, "below 0.001 %"), (0.0, "0 %"), (None, "none")]
+
+
+@pytest.mark.parametrize(("value", "said"), SHARES)
+def test_shares_of_a_comparison_are_percentages_throughout(value, said):
+    assert plain(share(value)) == said

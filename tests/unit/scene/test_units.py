@@ -65,7 +65,15 @@ def test_an_angle_is_no_plain_number():
 
 @pytest.mark.parametrize(
     ("unit", "shown", "thousandth_power"),
-    [("m", "mm", 1), ("N/m^2", "N/mm^2", -2), ("N m^2", "N mm^2", 2), ("Pa", "N/mm^2", -2), ("N", "N", 0)],
+    [
+        ("m", "mm", 1),
+        ("N/m^2", "kN/m^2", -1),
+        ("N m^2", "N mm^2", 2),
+        ("Pa", "GPa", -3),
+        ("N", "N", 0),
+        ("N/m", "N/mm", -1),
+        ("N s/m^2", "N s/m^2", 0),
+    ],
 )
 def test_display_units_are_of_the_same_dimension(unit, shown, thousandth_power):
     assert units.display_unit(unit) == shown
