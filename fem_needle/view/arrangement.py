@@ -110,7 +110,7 @@ class Arrangement:
     @property
     def note(self) -> str:
         """What is not to scale."""
-        arrows = "" if not self.newton else f"; arrows: {SHOWN * self.length:.3g} mm = {SHOWN * self.length / self.newton:.3g} N"
+        arrows = "" if not self.newton else f"; arrows: {SHOWN * self.length:.4g} mm = {SHOWN * self.length / self.newton:.3g} N"
         radius = self.scene.needle.radius
         true = radius is not None and radius >= DRAWN_RADIUS * self.scene.needle.length
         thickness = "" if true else "; thickness of the needle not to scale"
