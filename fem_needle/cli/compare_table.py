@@ -12,12 +12,14 @@ import typer
 from fem_needle.cli.run_table import model_text
 from fem_needle.cli.short_path import short_path
 from fem_needle.cli.tables import new_table, show
+from fem_needle.display import without_rounding
 
 if TYPE_CHECKING:
     from fem_needle.comparison.at_rest import RestStates, StaticErrors
     from fem_needle.comparison.ranges import Interval
     from fem_needle.comparison.result import ComparedModel, Comparison, ModelAnswer
     from fem_needle.comparison.runs import RunErrors
+    from fem_needle.trajectory import Trajectory
 
 Row = tuple[str, ...]
 EARLY = "ends early"
@@ -117,7 +119,7 @@ def _in_the_run(comparison: Comparison) -> Iterator[Row]:
     known = [run for run in runs if run is not None]
     yield "in the run:", *("" for _ in known)
     yield "  ends", *(f"{1e3 * run.run.depth[-1]:.4g} mm, {run.run.time[-1]:.4g} s" for run in known)
-    yield "  tip at the end [mm]", *(f"{1e3 * run.run.tip_deflection[-1]:.5g}" for run in known)
+    yield "  tip at the end [mm]", *(f"{_last_tip(run.run):.5g}" for run in known)
     yield _errors(comparison, "  largest tip error", lambda model: _run_percent(model, _moving(model).largest_tip))
     yield _errors(comparison, "  largest shape error", lambda model: _run_percent(model, float(_moving(model).shape.max())))
     if comparison.scene.insertion.kind == "force":
@@ -126,6 +128,11 @@ def _in_the_run(comparison: Comparison) -> Iterator[Row]:
         cells = (_run_percent(model, _moving(model).energies[f"{name}_energy"]) for model in comparison.models)
         yield f"  {name} energy error", "", *cells
     yield "  energy residual", *(f"{run.run.summary['relative_energy_residual']:.1e}" for run in known)
+
+
+def _last_tip(run: Trajectory) -> float:
+    """Return the tip at the end [mm], round-off as 0."""
+    return 1e3 * without_rounding(float(run.tip_deflection[-1]), run.summary["max_abs_tip_deflection"])
 
 
 def _cost(comparison: Comparison) -> Iterator[Row]:
