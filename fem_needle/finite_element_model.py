@@ -13,7 +13,7 @@ from fem_needle.models import ChosenPlant
 from fem_needle.needle import FiniteElementNeedle
 from fem_needle.plant import Plant
 from fem_needle.rounding import round_off
-from fem_needle.scene import Scene
+from fem_needle.scene import Scene, as_function
 
 ELEMENT_CHOICES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 ELEMENT_SHARE = 0.1  # of the tolerance: what the mesh may cost
@@ -23,6 +23,7 @@ MESH_INSTANTS = 12
 VIBRATING = 4.0 / 3.0  # the error of a free vibration over the difference from twice as many elements: its order is 2 or more
 PILOT_ELEMENTS = 8
 LONGEST_ELEMENT = 4.0  # decay lengths (4 EI / k)^(1/4): meshes of longer ones may agree with each other and be wrong
+SWOLLEN_TIMES = 200  # at which the largest stiffness factor is looked for
 GROWN = 2.0  # an error that two finer meshes make larger by this factor is round-off
 
 
@@ -118,7 +119,8 @@ class Meshes:
     def decay_lengths(self, count: int) -> float:
         """Return the length of one of so many elements over the shortest decay length of the layers that the tip reaches."""
         scene, (_, deepest) = self.scene, self.scene.insertion.depth_range(self.scene.duration)
-        reached = [layer.foundation_modulus for layer in scene.tissue.layers if layer.start < deepest]
+        swollen = float(np.max(as_function(scene.tissue.stiffness_factor).value(np.linspace(0.0, scene.duration, SWOLLEN_TIMES))))
+        reached = [swollen * layer.foundation_modulus for layer in scene.tissue.layers if layer.start < deepest]
         span = deepest if scene.support.kind == "entry" else scene.needle.length
         return span / count * (max(reached, default=0.0) / (4.0 * scene.needle.bending_stiffness)) ** 0.25
 

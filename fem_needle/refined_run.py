@@ -270,16 +270,25 @@ def next_ratio(expected: Expectation, allowed: float) -> float:
 
 
 def difference(coarser: _Trial, finer: _Trial) -> float:
-    """Return the largest difference of two runs' tips at common times and at the end, relative to the finer one's largest tip."""
+    """Return the largest difference of two runs' tips at common times and at the end, relative to the finer one's largest tip.
+
+    Of a push also that of the depths, relative to the largest depth: a straight needle has no tip to compare.
+    """
     times, others = coarser.times, finer.times
-    tips, other_tips = coarser.tips, finer.tips
-    scale = max(float(np.max(np.abs(other_tips))), finer.job.scene.numerics.absolute_tolerance)
-    slack = 1e-9 * others[-1]
+    slack, floor = 1e-9 * others[-1], finer.job.scene.numerics.absolute_tolerance
     places = np.minimum(np.searchsorted(others, times - slack), len(others) - 1)
     common = np.abs(others[places] - times) <= slack
     common[-1] = False  # a push may end at slightly different times
-    before = float(np.max(np.abs(tips - other_tips[places])[common], initial=0.0))
-    return max(before, abs(float(tips[-1] - other_tips[-1]))) / scale
+
+    def relative(values: Array, other_values: Array) -> float:
+        before = float(np.max(np.abs(values - other_values[places])[common], initial=0.0))
+        apart = max(before, abs(float(values[-1] - other_values[-1])))
+        return apart / max(float(np.max(np.abs(other_values))), floor)
+
+    found = relative(coarser.tips, finer.tips)
+    if finer.job.scene.insertion.kind != "force":
+        return found
+    return max(found, relative(*(np.array([sample.depth for sample in run.samples]) for run in (coarser, finer))))
 
 
 def is_undamped(job: Job) -> bool:

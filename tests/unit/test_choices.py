@@ -98,9 +98,11 @@ def test_meshes_that_agree_and_are_wrong_are_told():
     assert wrong and any(told in text for text in run.summary["warnings"])
 
 
-def test_elements_are_as_short_as_the_decay_asks_where_that_is_possible():
-    layers = (Layer(foundation_modulus=characteristic_modulus(300.0)),)  # the needle is 300 decay lengths long
+@pytest.mark.parametrize("swelling", [1.0, 1e4])
+def test_elements_are_as_short_as_the_decay_asks_where_that_is_possible(swelling):
+    layers = (Layer(foundation_modulus=characteristic_modulus(300.0) / swelling),)  # the needle is 300 decay lengths long
     scene = scene_of("hub", held(0.1), layers=layers, numerics={"analysis": "static", "output_step": 1.0})
+    scene = scene.with_value("tissue.stiffness_factor", swelling)
     run = run_scene(scene)
     assert run.summary["elements"] >= 300.0 / 4.0
     assert run.summary["warnings"] == []

@@ -10,6 +10,7 @@ from fem_needle.exact import exact_static
 from fem_needle.expectation import SAFETY, expectation
 from fem_needle.finite_element_model import Meshes
 from fem_needle.refined_run import SHORTEST, next_ratio
+from fem_needle.scene import Friction, Insertion, Sinusoid
 from fem_needle.scene_file import load_scene
 from tests.consistency.scenes import LAYERS, moving, scene_of
 
@@ -97,3 +98,18 @@ def test_the_ladder_of_meshes_ends():
     assert meshes.finer(meshes.needle(2), 1.5).describe()["elements"] == 3
     assert meshes.finer(meshes.needle(2), 100.0).describe()["elements"] == 256
     assert meshes.finer(meshes.needle(2), 1000.0) is None
+
+
+@pytest.mark.slow
+def test_a_straight_needle_is_pushed_to_its_depth_within_the_tolerance():
+    """It has no tip to compare; the depth is what a push asks for."""
+    push = Insertion(kind="force", initial_depth=0.02, push_force=Sinusoid(mean=1.0, amplitude=1.0, frequency=2.0))
+    friction = Friction(viscous=10.0, viscous_per_length=100.0)
+    scene = scene_of("entry", push, (), (), friction=friction, duration=0.25).with_value("numerics.elements", 1)
+    depths, errors = [], []
+    for tolerance in (1e-2, 1e-4):
+        run = run_scene(scene, tolerance=tolerance)
+        depths.append(run.depth[-1])
+        errors.append(run.summary["error_estimate"])
+    assert 0.0 < abs(depths[0] / depths[1] - 1.0) <= errors[0] <= 1e-2
+    assert 0.0 < errors[1] <= 1e-4
