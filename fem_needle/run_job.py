@@ -149,7 +149,8 @@ def collect(job: Job, grid: TimeGrid, samples: list[Sample], *, live: bool) -> R
                 with failing_as_step(last.time if last else 0.0, last.depth if last else job.scene.insertion.first_depth):
                     sample = next(marching)
             except StopIteration as finished:
-                job.observer.progress(1.0)  # also where it ended before its time
+                if last is not None and last.time < grid.outputs[-1]:
+                    job.observer.progress(1.0)  # it ended before its time
                 return finished.value
             samples.append(sample)
             job.observer.progress(sample.time / grid.outputs[-1])

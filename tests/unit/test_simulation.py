@@ -149,6 +149,9 @@ def test_progress_is_complete_where_a_run_ends_before_its_time():
     run = simulate(plant(scene), time_step=1e-3, analysis="quasi-static", output_step=0.01, observer=watcher)
     assert run.summary["stop_reason"] == "final-depth" and run.time[-1] < 0.9
     assert watcher.fractions[-2] < 0.9 and watcher.fractions[-1] == 1.0
+    whole = Watcher()
+    simulate(plant(), time_step=1e-3, analysis="static", output_step=0.01, observer=whole)
+    assert whole.fractions.count(1.0) == 1
 
 
 def test_final_depth_is_the_reason_where_the_scene_ends_by_itself():
