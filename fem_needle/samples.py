@@ -81,7 +81,7 @@ def sample_step(
         speed=instant.speed,
         coordinates=solution.coordinates,
         point_forces=solution.forces,
-        guide_force=_guide_forces(step, end),
+        guide_force=_guide_forces(step, end, inertia=inertia),
         push_force=mass * instant.acceleration + resisting - axial_force,
         friction_force=friction,
         tissue_force=tissue,
@@ -138,10 +138,12 @@ def reactions_of_clamp(plant: Plant, residual: Array, depth: float, point_forces
     return plant.clamp_reactions(residual, depth)
 
 
-def _guide_forces(step: Step, end: StepEnd) -> Array:
-    """Return the guides' forces: a rigid one's as the mean over the step, about which an index-3 multiplier alternates."""
+def _guide_forces(step: Step, end: StepEnd, *, inertia: bool) -> Array:
+    """Return the guides' forces; with inertia a rigid one's mean over the step, about which an index-3 multiplier alternates."""
     points = end.stage.points
     forces = end.solution.forces[: points.guides]
+    if not inertia:
+        return forces
     weighted = [w * s.forces[: points.guides] for w, s in zip(step.method.weights, step.solutions, strict=True)]
     return np.where(points.guide_compliance > 0.0, forces, np.sum(weighted, axis=0)) if points.guides else forces
 

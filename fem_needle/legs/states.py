@@ -87,9 +87,11 @@ class Leg:
         return momenta_of(self.matrices, self.instants, at, self.coordinates[at], self.velocities[at])
 
     def guide_means(self, done: Indices) -> Array:
-        """Return what is shown of the guides' forces after so many steps: a rigid one's mean over the last step."""
+        """Return what is shown of the guides' forces after so many steps: with inertia a rigid one's mean over the last step."""
         points, guides = self.points, self.points.guides
         forces = self.forces[self.stride * done, :guides]
+        if not self.inertia:
+            return forces
         nodes = self.forces[self.nodes[np.maximum(done - 1, 0)], :guides]
         means = np.einsum("s,tsg->tg", self.method.weights, nodes)
         return np.where(points.guide_compliance > 0.0, forces, means)

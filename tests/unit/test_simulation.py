@@ -4,7 +4,7 @@ import pytest
 from fem_needle import ComputationError, FiniteElementNeedle, load_scene, run_scene, simulate, trajectory
 from fem_needle.legs import equilibria
 from fem_needle.march import TimeGrid, output_times, time_grid
-from fem_needle.scene import Friction, Guide, Insertion, Sinusoid, TipLoad
+from fem_needle.scene import Friction, Guide, Insertion, Layer, Sinusoid, TipLoad
 from fem_needle.steppers import StaticStepper
 from tests.consistency.scenes import GEL, LAYERS, held, moving, profile, scene_of
 
@@ -187,6 +187,19 @@ def test_energies_that_miss_under_rigid_guides_advise_damping(stiffness, radius,
     run.series["energy_residual"] = run.energy_residual + run.bending_energy
     (warning,) = trajectory.energy_warnings(run)
     assert ("spectral_radius = 0.8 calms rigid guides" in warning) is is_advised
+
+
+@pytest.mark.parametrize("loop", ["numpy", "auto"])
+@pytest.mark.parametrize(("analysis", "damping"), [("static", 0.0), ("quasi-static", 0.0), ("quasi-static", 50.0)])
+def test_forces_on_a_needle_without_inertia_sum_to_zero_under_rigid_guides(analysis, damping, loop):
+    """However long the steps: a guide's force is that of the instant. What viscosity takes at the start is an extrapolation."""
+    layers = (Layer(foundation_modulus=5e3, damping=damping),)
+    support = {"guides": [Guide(position=-0.0123), Guide(position=-0.04, stiffness=500.0)]}
+    scene = scene_of("hub", moving(0.05, 0.05, 0.1), layers, [TipLoad(force=0.1)], support=support, duration=None)
+    run = simulate(plant(scene.with_value("numerics.loop", loop)), time_step=0.1, analysis=analysis, output_step=0.1)
+    forces = [run.hub_force, run.tissue_force, *run.guide_force.T, np.full(run.time.shape, 0.1)]
+    assert np.max(np.abs(sum(forces)[1 if damping else 0 :])) < 1e-9
+    assert np.ptp(run.guide_force[:, 0]) > 0.01
 
 
 def test_reversal_holds_and_reinsertion():
