@@ -24,7 +24,14 @@ SHORT = ("--analysis", "static", "--output-step", "4", "--elements", "4")
 
 def start(folder, *options, **named):
     command = [sys.executable, "-m", "fem_needle", "run", "thesis", "--out", str(folder), *options]
-    return subprocess.Popen(command, cwd=folder.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **named)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=folder.parent, preexec_fn=heed, **pipes, **named)
+
+
+def heed():
+    """Heed the signals that a shell lets its background jobs ignore, and the tests with them."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def wait_for(condition):
