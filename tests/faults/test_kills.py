@@ -24,8 +24,7 @@ SHORT = ("--analysis", "static", "--output-step", "4", "--elements", "4")
 
 def start(folder, *options, **named):
     command = [sys.executable, "-m", "fem_needle", "run", "thesis", "--out", str(folder), *options]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen(command, cwd=folder.parent, preexec_fn=heed, **pipes, **named)
+    return subprocess.Popen(command, cwd=folder.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **named)
 
 
 def heed():
@@ -89,7 +88,7 @@ def test_a_run_killed_anywhere(tmp_path, count):
                                     pytest.param(signal.SIGHUP, marks=pytest.mark.slow)])  # fmt: skip
 def test_a_run_that_is_ended_keeps_what_was_computed(tmp_path, number):
     folder = tmp_path / "run"
-    process = start(folder, *LONG, "--set", "numerics.output_points=2")
+    process = start(folder, *LONG, "--set", "numerics.output_points=2", preexec_fn=heed)
     after(folder, 3)
     process.send_signal(number)
     _, err = process.communicate(timeout=60)
