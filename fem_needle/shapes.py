@@ -11,6 +11,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.piecewise import PiecewisePolynomials
 from fem_needle.table_terms import Term
 
 Array = NDArray[np.float64]
@@ -75,3 +76,6 @@ class Shapes(Protocol):
 
     def straight(self, deflection: float, angle: float) -> Array:
         """Return the coordinates of deflection + angle x."""
+
+    def polynomials(self) -> PiecewisePolynomials:
+        """Return the shapes as polynomials on pieces, always the same object."""

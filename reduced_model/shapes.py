@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fem_needle import banded
 from fem_needle.gauss import gauss_rule
+from fem_needle.piecewise import PiecewisePolynomials, fitted_polynomials
 from fem_needle.shapes import Kind
 from fem_needle.table_terms import Block, Term
 from reduced_model.modes import ClampedFreeModes
@@ -160,6 +161,14 @@ class LineShapes:
         coordinates = np.zeros(self.size)
         coordinates[:2] = deflection, angle
         return coordinates
+
+    def polynomials(self) -> PiecewisePolynomials:
+        """Return the functions as polynomials on pieces, right to about 1e-13."""
+        return self._polynomials
+
+    @cached_property
+    def _polynomials(self) -> PiecewisePolynomials:
+        return fitted_polynomials(self.values, self.breaks)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from math import factorial
 from typing import ClassVar
 
 import numpy as np
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 
 from fem_needle.elements.integrals import IntervalIntegrals, interval_integrals
 from fem_needle.elements.mesh import LineMesh
+from fem_needle.piecewise import PiecewisePolynomials
 from fem_needle.shapes import Kind
 
 Array = NDArray[np.float64]
@@ -34,3 +37,13 @@ class ElementShapes(LineMesh):
         coordinates[::stride] = deflection + angle * self.nodes
         coordinates[1::stride][: self.elements + 1] = angle
         return coordinates
+
+    def polynomials(self) -> PiecewisePolynomials:
+        """Return the shapes of every element as polynomials."""
+        return self._polynomials
+
+    @cached_property
+    def _polynomials(self) -> PiecewisePolynomials:
+        orders = range(self.degree + 1)
+        unit = np.stack([self.reference.unit_shapes(0.0, order) / factorial(order) for order in orders], axis=-1)
+        return PiecewisePolynomials(self.nodes, self.scales[:, :, None] * unit, self.stride)

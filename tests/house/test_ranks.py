@@ -19,6 +19,7 @@ RANKS = {
     "table_terms": 1,
     "shapes": 2,
     "path": 0,
+    "piecewise": 0,
     "shipped": 0,
     "atomic_file": 0,
     "folder_lock": 0,
