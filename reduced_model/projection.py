@@ -9,11 +9,14 @@ Here ' of a matrix is its transpose and V_z = dV/dz.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import FiniteElementNeedle, banded
 from fem_needle.path import CutPath
+from fem_needle.piecewise import PiecewisePolynomials
 from fem_needle.plant import Operators, Points, RestTerms
 from fem_needle.tables import OperatorTable
 from reduced_model.bases import Basis
@@ -153,6 +156,22 @@ class ProjectedNeedle:
     def describe(self) -> dict[str, int | float | str]:
         """Return kind, number of columns and of elements."""
         return {"model": "projected", "modes": self.basis.count, "elements": self.needle.mesh.elements}
+
+    def polynomials(self) -> PiecewisePolynomials | None:
+        """Return 1, x and the columns as polynomials on the elements; None where the columns move with the depth."""
+        return None if self.basis.moves else self._polynomials
+
+    @cached_property
+    def _polynomials(self) -> PiecewisePolynomials:
+        elements = self.needle.mesh.polynomials()
+        pieces, count, _ = elements.coefficients.shape
+        columns = self._columns(self.scene.needle.length)
+        local = columns[elements.stride * np.arange(pieces)[:, None] + np.arange(count)]
+        coefficients = np.einsum("pik,pij->pjk", elements.coefficients, local)
+        coefficients[:, :2] = 0.0  # exactly what they are, without rounding
+        coefficients[:, 0, 0] = 1.0
+        coefficients[:, 1, 0], coefficients[:, 1, 1] = elements.nodes[:-1], self.needle.mesh.lengths
+        return PiecewisePolynomials(elements.nodes, coefficients, 0)
 
     def _columns(self, depth: float, derivative: int = 0) -> Array:
         rigid = self._rigid if derivative == 0 else np.zeros_like(self._rigid)
