@@ -86,7 +86,7 @@ def test_corrections_are_their_polynomials(name, modes):
     assert shapes.size > modes + 2
     found = shapes.polynomials()
     for order in range(3):
-        misses = piecewise.misses(found, shapes, order)
+        misses = piecewise.misses(found, shapes, order, 100)
         assert np.max(misses[: modes + 2]) < 2e-13
         assert np.max(misses[modes + 2 :]) < ROUNDING[name]
     assert np.max(piecewise.mass_misses(found, mass_of(shapes))) < ROUNDING[name]
