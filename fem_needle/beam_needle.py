@@ -19,6 +19,7 @@ from fem_needle.frames import Frame
 from fem_needle.loads import turns_with_needle
 from fem_needle.path import CutPath
 from fem_needle.plant import SMALLEST_COMPLIANCE, Operators, Points, RestTerms
+from fem_needle.row_blocks import row_blocks
 from fem_needle.scene import Guide, LateralLoad, Scene, as_function
 from fem_needle.shapes import Shapes
 from fem_needle.tables import OperatorTable, PointTable
@@ -128,15 +129,19 @@ class BeamNeedle(ABC):
         flexibility, rate = self._flexibilities(np.array([depth]), count)
         return Points(rows, rates, flexibility[0], rate[0], len(guides), _compliances(guides))
 
-    def deflection(self, coordinates: Array, forces: Array, depth: float, arc_length: Array, derivative: int = 0) -> Array:
-        """Return w [m] or a derivative of it by arc length at stations from the hub (0) to the tip (l)."""
+    def deflection(
+        self, coordinates: Array, forces: Array, depth: float | Array, arc_length: Array, derivative: int = 0
+    ) -> Array:
+        """Return w [m] or a derivative of it by arc length at stations from the hub (0) to the tip (l), of one state or many."""
         stations = np.asarray(arc_length, dtype=float)
+        if np.ndim(depth):
+            return self._deflections(coordinates, np.asarray(depth, dtype=float), stations, derivative)
         if not self.is_entry:
             return self.shapes.evaluate(coordinates, stations, derivative)
         result = np.zeros(stations.shape)
         inside = stations > self.scene.needle.length - depth
         if depth > 0:
-            places, stretch = self.frame.places(stations[inside], self.scene.needle.length, depth)
+            places, stretch = self.frame.places(stations[inside], self.scene.needle.length, float(depth))
             result[inside] = self.shapes.evaluate(coordinates, places, derivative) / stretch**derivative
         return result
 
@@ -155,6 +160,22 @@ class BeamNeedle(ABC):
         )
         beam = self._beam
         return OperatorTable(matrix_table(beam, self.foundation, depths), rate_table(beam, self.foundation, depths), points)
+
+    def _deflections(self, coordinates: Array, depths: Array, stations: Array, derivative: int) -> Array:
+        """Return the same of many states: (T, n) and (T,) to (T, stations)."""
+        result = np.zeros((len(depths), stations.size))
+        length, count = self.scene.needle.length, self.shapes.half_bandwidth + 1  # shapes at a place
+        for block in row_blocks(len(depths), stations.size * count):
+            if not self.is_entry:
+                result[block] = self.shapes.evaluate(coordinates[block], stations, derivative)
+                continue
+            inserted = depths[block, None]
+            row, station = np.nonzero((stations > length - inserted) & (inserted > 0))
+            places, stretch = self.frame.places(stations[station], length, depths[block][row])
+            first, values = self.shapes.rows(places, derivative)
+            acting = coordinates[block][row[:, None], first[:, None] + np.arange(values.shape[1])]
+            result[block][row, station] = np.einsum("kj,kj->k", values, acting) / stretch**derivative
+        return result
 
     @abstractmethod
     def describe(self) -> dict[str, int | float | str]:

@@ -37,8 +37,11 @@ class Frame(Protocol):
     def axis_positions(self, places: Array, depth: float) -> Array:
         """Return y [m] of places on the shapes, the inverse of `positions`."""
 
-    def places(self, arc_length: Array, length: float, depth: float) -> tuple[Array, float]:
-        """Return the places of stations of the part that bends, and how many metres a unit of place is."""
+    def places(self, arc_length: Array, length: float, depth: Depth) -> tuple[Array, Depth | float]:
+        """Return the places of stations of the part that bends, and how many metres a unit of place is.
+
+        Depths may be one for each station.
+        """
 
     @property
     def stretch_rate(self) -> float:
@@ -86,7 +89,7 @@ class MaterialFrame:
         """Return y = s - (l - z) [m]."""
         return depth - (self.length - places)
 
-    def places(self, arc_length: Array, length: float, depth: float) -> tuple[Array, float]:
+    def places(self, arc_length: Array, length: float, depth: Depth) -> tuple[Array, Depth | float]:
         """Return s and 1."""
         return arc_length, 1.0
 
@@ -123,6 +126,6 @@ class StretchedFrame:
         """Return y = xi z [m], rounded as counted from the tip."""
         return depth - depth * (1.0 - places)
 
-    def places(self, arc_length: Array, length: float, depth: float) -> tuple[Array, float]:
+    def places(self, arc_length: Array, length: float, depth: Depth) -> tuple[Array, Depth | float]:
         """Return xi = 1 + (s - l) / z and z."""
         return 1 + (arc_length - length) / depth, depth

@@ -17,6 +17,7 @@ from fem_needle.errors import SceneError
 from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
 from fem_needle.mesh_file import MAXIMUM_ELEMENTS, mesh_positions, needle_nodes
 from fem_needle.plant import Operators
+from fem_needle.row_blocks import row_blocks
 from fem_needle.scene import Scene
 
 Array = NDArray[np.float64]
@@ -69,10 +70,17 @@ class FiniteElementNeedle(BeamNeedle):
         self._flexible = FlexibleMesh(self.mesh)
         self.stiffness_round_off = self._flexible.stiffness_round_off
 
-    def deflection(self, coordinates: Array, forces: Array, depth: float, arc_length: Array, derivative: int = 0) -> Array:
-        """Return w [m] or a derivative of it by arc length at stations from the hub (0) to the tip (l)."""
+    def deflection(
+        self, coordinates: Array, forces: Array, depth: float | Array, arc_length: Array, derivative: int = 0
+    ) -> Array:
+        """Return w [m] or a derivative of it by arc length at stations from the hub (0) to the tip (l), of one state or many."""
         smooth = super().deflection(coordinates, forces, depth, arc_length, derivative)
-        return smooth if self.is_entry else smooth + self._kinks(forces, depth, np.asarray(arc_length, dtype=float), derivative)
+        if self.is_entry:
+            return smooth
+        stations = np.asarray(arc_length, dtype=float)
+        if np.ndim(depth):
+            return smooth + self._many_kinks(forces, np.asarray(depth, dtype=float), stations, derivative)
+        return smooth + self._kinks(forces, float(depth), stations, derivative)
 
     def describe(self) -> dict[str, int | float | str]:
         """Return kind, number of elements and degree."""
@@ -97,9 +105,6 @@ class FiniteElementNeedle(BeamNeedle):
                 rate[:, first, second] = same * moved
         return flexibility, rate
 
-    def _kink_scale(self, element: int) -> float:
-        return float(self.mesh.lengths[element]) ** 3 / self.scene.needle.bending_stiffness
-
     def _kinks(self, forces: Array, depth: float, stations: Array, derivative: int) -> Array:
         result = np.zeros(stations.shape)
         for point, force in zip(self._point_list, forces, strict=False):
@@ -109,6 +114,24 @@ class FiniteElementNeedle(BeamNeedle):
             shape = kink((stations[near] - start) / length, place, self.mesh.degree, derivative)
             result[near] += force * self._kink_scale(element) / length**derivative * shape
         return result
+
+    def _many_kinks(self, forces: Array, depths: Array, stations: Array, derivative: int) -> Array:
+        """Return the same of many states: (T, p) and (T,) to (T, stations)."""
+        result = np.zeros((len(depths), stations.size))
+        for index, point in enumerate(self._point_list):
+            element, place = self.mesh.locate_all(self.frame.places_of(point.position, depths)[0])
+            start, length = self.mesh.nodes[element], self.mesh.lengths[element]
+            scale = forces[:, index] * length**3 / self.scene.needle.bending_stiffness / length**derivative
+            for block in row_blocks(len(depths), stations.size):
+                first, last = start[block, None], start[block, None] + length[block, None]
+                row, near = np.nonzero((stations >= first) & (stations <= last))
+                row += block.start
+                shape = kink((stations[near] - start[row]) / length[row], place[row], self.mesh.degree, derivative)
+                result[row, near] += scale[row] * shape
+        return result
+
+    def _kink_scale(self, element: int) -> float:
+        return float(self.mesh.lengths[element]) ** 3 / self.scene.needle.bending_stiffness
 
 
 def _line_mesh(scene: Scene, elements: int | None, degree: int, mesh: str | Path | ArrayLike | None) -> ElementShapes:

@@ -249,9 +249,28 @@ class Plant(Protocol):
         """Return dT/dz [N] at fixed coordinates, velocities and speed."""
 
     def deflection(
-        self, coordinates: Array, forces: Array, depth: float, arc_length: Array, derivative: int = 0
+        self, coordinates: Array, forces: Array, depth: float | Array, arc_length: Array, derivative: int = 0
     ) -> Array:
-        """Return deflections, or derivatives, at stations from the hub (0) to the tip (l)."""
+        """Return deflections [m], or derivatives by arc length, at stations of one state or of many.
+
+        Parameters
+        ----------
+        coordinates
+            Shape (n,), or (T, n) of T states.
+        forces
+            At the points [N], shape (p,) or (T, p).
+        depth
+            [m], a number or shape (T,).
+        arc_length
+            Stations from the hub, 0, to the tip, l [m], shape (stations,), the same for all states.
+        derivative
+            Its order, 0 to 3.
+
+        Returns
+        -------
+        Array
+            Shape (stations,) or (T, stations).
+        """
 
     def describe(self) -> dict[str, int | float | str]:
         """Return what ``summary.json`` says of the model: kind, elements or modes."""

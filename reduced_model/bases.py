@@ -33,8 +33,11 @@ class Basis(Protocol):
     def moves(self) -> bool:
         """Whether the columns change with the depth."""
 
-    def columns(self, depth: float, derivative: int = 0) -> Array:
-        """Return the columns at a depth [m], or their first or second derivative by it."""
+    def columns(self, depth: float | Array, derivative: int = 0) -> Array:
+        """Return the columns at a depth [m], or their first or second derivative by it; shape (plant size, count).
+
+        Where they move, depths (T,) may be many: shape (T, plant size, count).
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +58,7 @@ class FixedBasis:
         """Number of columns."""
         return self.matrix.shape[1]
 
-    def columns(self, depth: float, derivative: int = 0) -> Array:
+    def columns(self, depth: float | Array, derivative: int = 0) -> Array:
         """Return the matrix, or zeros."""
         return self.matrix if derivative == 0 else np.zeros_like(self.matrix)
 
@@ -73,9 +76,13 @@ class GrownModes:
         """Number of columns."""
         return self.modes.count
 
-    def columns(self, depth: float, derivative: int = 0) -> Array:
+    def columns(self, depth: float | Array, derivative: int = 0) -> Array:
         """Return the interpolation of d^n/dz^n phi_i(z xi) = xi^n phi_i^(n)(z xi)."""
-        modes = self.modes.values
+        depths = np.reshape(np.asarray(depth, dtype=float), (-1, 1))
+
+        def modes(places: Array, order: int) -> Array:
+            """Return the modes at places (T, n), shape (count, T, n)."""
+            return self.modes.values(places.ravel(), order).reshape(-1, *places.shape)
 
         def power(xi: Array, lost: int) -> Array:
             """Return d^lost/dxi^lost of xi^derivative."""
@@ -83,14 +90,15 @@ class GrownModes:
             return factor * xi ** (derivative - lost) if derivative >= lost else np.zeros_like(xi)
 
         def value(xi: Array, order: int) -> Array:
-            found = power(xi, 0) * depth**order * modes(depth * xi, derivative + order)
+            found = power(xi, 0) * depths**order * modes(depths * xi, derivative + order)
             if order and derivative:
-                found = found + order * power(xi, 1) * depth ** (order - 1) * modes(depth * xi, derivative + order - 1)
+                found = found + order * power(xi, 1) * depths ** (order - 1) * modes(depths * xi, derivative + order - 1)
             if order == 2 and derivative == 2:
-                found = found + power(xi, 2) * modes(depth * xi, derivative)
-            return np.asarray(found, dtype=float)
+                found = found + power(xi, 2) * modes(depths * xi, derivative)
+            return np.asarray(found, dtype=float).reshape(-1, len(xi))
 
-        return interpolated(self.shapes, value)
+        found = interpolated(self.shapes, value).reshape(self.shapes.size, self.count, -1)
+        return np.moveaxis(found, 2, 0) if np.ndim(depth) else found[:, :, 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +118,7 @@ class LineModes:
     def _matrix(self) -> Array:
         return interpolated(self.shapes, self.modes.values)
 
-    def columns(self, depth: float, derivative: int = 0) -> Array:
+    def columns(self, depth: float | Array, derivative: int = 0) -> Array:
         """Return the interpolation of phi_i, or zeros."""
         return self._matrix if derivative == 0 else np.zeros_like(self._matrix)
 

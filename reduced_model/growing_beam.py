@@ -53,7 +53,7 @@ class FixedFrame:
         """Return y [m]."""
         return places
 
-    def places(self, arc_length: Array, length: float, depth: float) -> tuple[Array, float]:
+    def places(self, arc_length: Array, length: float, depth: Depth) -> tuple[Array, Depth | float]:
         """Return y = s - (l - z) [m] and 1."""
         return depth - (length - arc_length), 1.0
 

@@ -18,6 +18,7 @@ from fem_needle import FiniteElementNeedle, banded
 from fem_needle.path import CutPath
 from fem_needle.piecewise import PiecewisePolynomials
 from fem_needle.plant import Operators, Points, RestTerms
+from fem_needle.row_blocks import row_blocks
 from fem_needle.tables import OperatorTable
 from reduced_model.bases import Basis
 from reduced_model.needle import INDEPENDENT_MODES, STABLE_SPECTRAL_RADIUS, resolved_directions
@@ -62,6 +63,13 @@ class ProjectedNeedle:
     def reconstruct(self, coordinates: Array, depth: float) -> Array:
         """Return the finite-element coordinates V a at a depth [m]."""
         return np.asarray(self._columns(depth) @ coordinates, dtype=float)
+
+    def _reconstructed(self, coordinates: Array, depths: Array) -> Array:
+        """Return the same of many states: (T, 2 + count) and (T,) to (T, n)."""
+        clamp, amplitudes = coordinates[:, :2] @ self._rigid.T, coordinates[:, 2:]
+        if not self.basis.moves:
+            return np.asarray(clamp + amplitudes @ self.basis.columns(0.0).T, dtype=float)
+        return clamp + np.einsum("tnc,tc->tn", self.basis.columns(depths), amplitudes)
 
     def operators(self, depth: float, time: float) -> Operators:
         """Return the projected matrices."""
@@ -146,12 +154,25 @@ class ProjectedNeedle:
         change = moved @ velocities + speed * (self._columns(depth, 2) @ coordinates)
         return rate + float(momentum @ change + force @ drift)
 
-    def deflection(self, coordinates: Array, forces: Array, depth: float, arc_length: Array, derivative: int = 0) -> Array:
-        """Return w [m] or a derivative of it by arc length at stations from the hub (0) to the tip (l)."""
+    def deflection(
+        self, coordinates: Array, forces: Array, depth: float | Array, arc_length: Array, derivative: int = 0
+    ) -> Array:
+        """Return w [m] or a derivative of it by arc length at stations from the hub (0) to the tip (l), of one state or many."""
+        if np.ndim(depth):
+            return self._deflections(coordinates, forces, np.asarray(depth, dtype=float), arc_length, derivative)
         if depth < self.smallest_depth:
             return np.zeros(np.shape(arc_length))
-        state = self.reconstruct(coordinates, depth)
+        state = self.reconstruct(coordinates, float(depth))
         return self.needle.deflection(state, np.zeros_like(forces), depth, arc_length, derivative)
+
+    def _deflections(self, coordinates: Array, forces: Array, depths: Array, arc_length: Array, derivative: int) -> Array:
+        """Return the same of many states: (T, 2 + count) and (T,) to (T, stations)."""
+        result = np.zeros((len(depths), np.size(arc_length)))
+        for block in row_blocks(len(depths), self.needle.size * self.size):
+            bent = block.start + np.flatnonzero(depths[block] >= self.smallest_depth)
+            state = self._reconstructed(coordinates[bent], depths[bent])
+            result[bent] = self.needle.deflection(state, np.zeros_like(forces[bent]), depths[bent], arc_length, derivative)
+        return result
 
     def describe(self) -> dict[str, int | float | str]:
         """Return kind, number of columns and of elements."""

@@ -16,8 +16,8 @@ from fem_needle.elements.reference import BUBBLE_ENERGY
 Array = NDArray[np.float64]
 
 
-def kink(place: Array | float, force_place: float, degree: int, derivative: int = 0) -> Array:
-    """Return the shape g (1), or a derivative by place, at places 0..1 of an element pushed at ``force_place``."""
+def kink(place: Array | float, force_place: Array | float, degree: int, derivative: int = 0) -> Array:
+    """Return the shape g (1), or a derivative by place, at places 0..1 of an element pushed at ``force_place``, one or each."""
     x = np.asarray(place, dtype=float)
     left = _left_part(x, force_place, derivative)
     right = (-1) ** derivative * _left_part(1 - x, 1 - force_place, derivative)
@@ -48,7 +48,7 @@ def kink_shift_rate(first: Array, second: Array, degree: int) -> Array:
     return np.asarray(rate)
 
 
-def _left_part(x: Array, a: float, derivative: int) -> Array:
+def _left_part(x: Array, a: Array | float, derivative: int) -> Array:
     """Derivatives of (1 - a)^2 x^2 (3 a - x - 2 a x) / 6, valid for x <= a."""
     factor = (1 - a) ** 2
     if derivative == 0:
