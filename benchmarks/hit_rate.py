@@ -44,7 +44,7 @@ class Patience:
         if time.perf_counter() > self.until:
             raise KeyboardInterrupt
 
-    def sample(self, sample: object) -> None:
+    def samples(self, block: object) -> None:
         """Ignore."""
 
 

@@ -25,7 +25,8 @@ from fem_needle.loads import load_case
 from fem_needle.march import TimeGrid, march
 from fem_needle.motion import DepthLaw, depth_law, landing_times, run_duration, shortest_period
 from fem_needle.plant import Operators, Plant
-from fem_needle.samples import Sample
+from fem_needle.sample_arrays import Samples
+from fem_needle.samples import stacked
 from fem_needle.skipping import inertia_free_stepper
 from fem_needle.statics import depth_derivative, solve_guided, solve_static
 
@@ -49,6 +50,7 @@ class _Piece:
     speeds: Array
     coordinates: Array
     rates: Array
+    tips: Array
 
     def operators(self, index: int) -> Operators:
         return self.plant.operators(float(self.depths[index]), float(self.times[index]))
@@ -73,8 +75,7 @@ def inertia_effect(plant: Plant) -> float:
     if scene.initial.shape != "equilibrium":
         return float("inf")
     law, pieces = depth_law(scene), _pilot(plant)
-    tips = [abs(float(plant.points(z).rows[-1] @ q)) for p in pieces for z, q in zip(p.depths, p.coordinates, strict=True)]
-    largest = max(*tips, scene.numerics.absolute_tolerance)
+    largest = max(*(float(np.max(np.abs(piece.tips))) for piece in pieces), scene.numerics.absolute_tolerance)
     forced = max((_forced_effect(piece) for piece in pieces), default=0.0)
     jumps = [pieces[0].momentum(0) - _starting_momentum(plant, pieces[0], law)]
     jumps += [right.momentum(0) - left.momentum(-1) for left, right in pairwise(pieces)]
@@ -96,8 +97,9 @@ def _pilot(plant: Plant) -> list[_Piece]:
         outputs += np.linspace(start, end, max(FEWEST_SAMPLES, int(np.ceil((end - start) / step))) + 1)[1:].tolist()
     if outputs[-1] < duration:
         outputs.append(duration)
-    samples = list(march(plant, inertia_free_stepper(plant), TimeGrid(tuple(outputs), landings, duration)))
-    return [_piece(plant, law, [s for s in samples if start <= s.time <= end]) for start, end in pairwise(marks)]
+    samples = stacked(list(march(plant, inertia_free_stepper(plant), TimeGrid(tuple(outputs), landings, duration))))
+    inside = [(samples.time >= start) & (samples.time <= end) for start, end in pairwise(marks)]
+    return [_piece(plant, law, samples.rows(mask)) for mask in inside]
 
 
 def _apart(marks: list[float], least: float) -> list[float]:
@@ -109,17 +111,17 @@ def _apart(marks: list[float], least: float) -> list[float]:
     return kept
 
 
-def _piece(plant: Plant, law: DepthLaw, samples: list[Sample]) -> _Piece:
-    times = np.array([sample.time for sample in samples])
-    coordinates = np.array([sample.coordinates for sample in samples])
+def _piece(plant: Plant, law: DepthLaw, samples: Samples) -> _Piece:
+    times, tip = samples.time, np.array([plant.scene.needle.length])
     speeds = [*(law.after(time).speed for time in times[:-1].tolist()), law.before(float(times[-1])).speed]
     return _Piece(
         plant,
         times,
-        np.array([max(sample.depth, plant.smallest_depth) for sample in samples]),
+        np.maximum(samples.depth, plant.smallest_depth),
         np.array(speeds),
-        coordinates,
-        np.gradient(coordinates, times, axis=0, edge_order=2),
+        samples.coordinates,
+        np.gradient(samples.coordinates, times, axis=0, edge_order=2),
+        plant.deflection(samples.coordinates, samples.point_forces, samples.depth, tip)[:, 0],
     )
 
 

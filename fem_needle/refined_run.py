@@ -21,7 +21,7 @@ from fem_needle.limits import check_steps
 from fem_needle.march import RunEnd, TimeGrid, time_grid
 from fem_needle.motion import shortest_period
 from fem_needle.run_job import Job, begin, collect, shown, stepper_of, total_error, trajectory_of
-from fem_needle.samples import Sample
+from fem_needle.sample_arrays import Samples, joined
 from fem_needle.steppers import DynamicStepper
 from fem_needle.trajectory import Trajectory, guide_advice
 
@@ -55,7 +55,7 @@ class _Trial:
 
     job: Job
     grid: TimeGrid
-    samples: list[Sample]
+    samples: Samples
     end: RunEnd
 
     @property
@@ -74,16 +74,11 @@ class _Trial:
         return self.end.steps * self.job.plant.size
 
     @property
-    def times(self) -> Array:
-        """Times of the samples [s]."""
-        return np.array([sample.time for sample in self.samples])
-
-    @property
     def tips(self) -> Array:
-        """Tip deflections [m]."""
-        plant = self.job.plant
-        depths = [max(sample.depth, plant.smallest_depth) for sample in self.samples]
-        return np.array([plant.points(z).rows[-1] @ s.coordinates for z, s in zip(depths, self.samples, strict=True)])
+        """Tip deflections [m] at the samples."""
+        plant, samples = self.job.plant, self.samples
+        tip = np.array([plant.scene.needle.length])
+        return plant.deflection(samples.coordinates, samples.point_forces, samples.depth, tip)[:, 0]
 
 
 class _InterruptedError(Exception):
@@ -127,14 +122,14 @@ class _Search:
         ComputationError
             With the trajectory so far.
         """
-        grid, samples = sampled_grid(job, min(step, job.choice.output_step) if final else step), list[Sample]()
+        grid, blocks = sampled_grid(job, min(step, job.choice.output_step) if final else step), list[Samples]()
         try:
-            end = collect(job, grid, samples, live=False)
-        except ComputationError as error:
-            error.partial = trajectory_of(job, grid, samples, None, RunEnd("failed", grid.steps)) if samples else None
-            self.trials.append(_Trial(job, grid, samples, RunEnd("failed", grid.steps)))
+            end = collect(job, grid, blocks, live=False)
+        except ComputationError:
+            if blocks:
+                self.trials.append(_Trial(job, grid, joined(blocks), RunEnd("failed", grid.steps)))
             raise
-        self.trials.append(_Trial(job, grid, samples, end))
+        self.trials.append(_Trial(job, grid, joined(blocks), end))
         if end.reason == "interrupted":
             raise _InterruptedError
         return self.trials[-1]
@@ -153,8 +148,8 @@ def run_refined(job: Job) -> Trajectory:
         _find_step(search, _settle_mesh(search))
     except _InterruptedError:
         search.error = None
-    except ComputationError:
-        if search.trials and search.trials[-1].end.reason == "failed":
+    except ComputationError as error:
+        if error.partial is not None:
             _show(search)
         raise
     return _show(search)
@@ -274,7 +269,7 @@ def difference(coarser: _Trial, finer: _Trial) -> float:
 
     Of a push also that of the depths, relative to the largest depth: a straight needle has no tip to compare.
     """
-    times, others = coarser.times, finer.times
+    times, others = coarser.samples.time, finer.samples.time
     slack, floor = 1e-9 * others[-1], finer.job.scene.numerics.absolute_tolerance
     places = np.minimum(np.searchsorted(others, times - slack), len(others) - 1)
     common = np.abs(others[places] - times) <= slack
@@ -288,7 +283,7 @@ def difference(coarser: _Trial, finer: _Trial) -> float:
     found = relative(coarser.tips, finer.tips)
     if finer.job.scene.insertion.kind != "force":
         return found
-    return max(found, relative(*(np.array([sample.depth for sample in run.samples]) for run in (coarser, finer))))
+    return max(found, relative(coarser.samples.depth, finer.samples.depth))
 
 
 def is_undamped(job: Job) -> bool:
@@ -346,8 +341,9 @@ def _show(search: _Search) -> Trajectory:
     """Show the last run to the observer and return it."""
     trial, job = search.trials[-1], search.trials[-1].job
     grid = time_grid(job.plant, trial.step, job.choice.output_step)
-    wanted = set(grid.outputs)
-    samples = [sample for sample in trial.samples if sample.time in wanted or sample is trial.samples[-1]]
+    wanted = np.isin(trial.samples.time, grid.outputs)
+    wanted[-1] = True
+    samples = trial.samples.rows(wanted)
     begin(job, grid)
     run = trajectory_of(job, grid, samples, None, trial.end)
     if search.error is not None:

@@ -21,13 +21,13 @@ from fem_needle.manifest import FAILED, FINISHED, INTERRUPTED, RUNNING, is_run_f
 from fem_needle.manifest import FILE as MANIFEST
 from fem_needle.plant import Plant
 from fem_needle.run_target import RunTarget, study_in
-from fem_needle.samples import Sample
+from fem_needle.sample_arrays import Samples, joined
 from fem_needle.scene import Scene
 from fem_needle.scene.steering import SIGNAL_PREFIXES
 from fem_needle.scene_file import load_scene, scene_text
 from fem_needle.series_file import read_series, series_bytes
 from fem_needle.trajectory import VARIABLES, Trajectory, summary_of, trajectory_from_samples
-from fem_needle.vtk_export import VtkSeries, frame_of_sample, frames_of_run
+from fem_needle.vtk_export import VtkSeries, frames_of_run, frames_of_samples
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class RunFolderWriter:
         self._claimed: FolderLock | None = None
         self._plant: Plant | None = None
         self._choice: dict[str, Any] = {}
-        self._samples: list[Sample] = []
+        self._blocks: list[Samples] = []
         self._arc_length = np.zeros(0)
         self._started = perf_counter()
 
@@ -100,19 +100,20 @@ class RunFolderWriter:
     def progress(self, fraction: float) -> None:
         """Ignore."""
 
-    def sample(self, sample: Sample) -> None:
-        """Write the frame of a sample.
+    def samples(self, block: Samples) -> None:
+        """Write the frames of samples.
 
         Raises
         ------
         ComputationError
-            If it cannot be written, as on a full disk.
+            If one cannot be written, as on a full disk.
         """
-        self._samples.append(sample)
+        self._blocks.append(block)
         if self._frames is None or self._plant is None:
             return
-        with _writing(f"the frame at time {sample.time:g} s, depth {sample.depth:g} m"):
-            self._frames.add(frame_of_sample(self._plant, sample, self._arc_length))
+        for frame in frames_of_samples(self._plant, block, self._arc_length):
+            with _writing(f"the frame at time {frame.time:g} s, depth {frame.depth:g} m"):
+                self._frames.add(frame)
 
     def finish(self, run: Trajectory) -> Trajectory:
         """Write series and summary; return the run with ``folder`` in its summary.
@@ -204,10 +205,10 @@ class RunFolderWriter:
             self._reserve = None
 
     def _seen(self, stop_reason: str) -> Trajectory | None:
-        if self._plant is None or not self._samples:
+        if self._plant is None or not self._blocks:
             return None
         known = {key: value for key, value in self._choice.items() if key != "output_times"}
-        run = trajectory_from_samples(self._plant, self._samples, {})
+        run = trajectory_from_samples(self._plant, joined(self._blocks), {})
         return replace(run, summary=known | summary_of(run) | {"stop_reason": stop_reason})
 
     def _finish_frames(self, run: Trajectory) -> None:

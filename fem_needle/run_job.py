@@ -14,7 +14,8 @@ from fem_needle.march import RunEnd, TimeGrid, failing_as_step, time_grid
 from fem_needle.modal_stepper import ModalStepper, needs_no_steps
 from fem_needle.models import ChosenPlant
 from fem_needle.plant import Plant
-from fem_needle.samples import Sample
+from fem_needle.sample_arrays import Samples, joined
+from fem_needle.samples import in_blocks
 from fem_needle.scene import Scene
 from fem_needle.skipping import inertia_free_stepper
 from fem_needle.steppers import DynamicStepper, Inviscid, StaticStepper, Stepper
@@ -30,8 +31,8 @@ class Observer(Protocol):
     def progress(self, fraction: float) -> None:
         """Learn how much of the run is done, 0 to 1; a refined run starts again."""
 
-    def sample(self, sample: Sample) -> None:
-        """Receive the next sample, once each; of a run that is being refined, when it is accurate enough."""
+    def samples(self, block: Samples) -> None:
+        """Receive the next samples, once each; of a run that is being refined, all together when they are accurate enough."""
 
 
 @dataclass(frozen=True)
@@ -59,24 +60,23 @@ class Nobody:
     def progress(self, fraction: float) -> None:
         """Ignore."""
 
-    def sample(self, sample: Sample) -> None:
+    def samples(self, block: Samples) -> None:
         """Ignore."""
 
 
 def run_live(job: Job, time_step: float, time_error: float | None) -> Trajectory:
-    """Run once; the observer sees each sample as it comes."""
+    """Run once; the observer sees the samples as they come."""
     grid = time_grid(job.plant, time_step, job.choice.output_step)
     begin(job, grid)
-    samples: list[Sample] = []
-    end = collect(job, grid, samples, live=True)
-    return trajectory_of(job, grid, samples, time_error, end)
+    blocks: list[Samples] = []
+    end = collect(job, grid, blocks, live=True)
+    return trajectory_of(job, grid, joined(blocks), time_error, end)
 
 
-def shown(job: Job, run: Trajectory, samples: list[Sample]) -> Trajectory:
+def shown(job: Job, run: Trajectory, samples: Samples) -> Trajectory:
     """Show finished samples to the observer; an interrupt while it writes leaves the run whole."""
     try:
-        for sample in samples:
-            job.observer.sample(sample)
+        job.observer.samples(samples)
     except KeyboardInterrupt:
         run.summary["stop_reason"] = "interrupted"
     return run
@@ -133,8 +133,8 @@ def begin(job: Job, grid: TimeGrid) -> None:
     job.observer.begin(job.plant, _settings(job, grid) | {"output_times": grid.outputs})
 
 
-def collect(job: Job, grid: TimeGrid, samples: list[Sample], *, live: bool) -> RunEnd:
-    """Append the samples of a run and return how it ended.
+def collect(job: Job, grid: TimeGrid, blocks: list[Samples], *, live: bool) -> RunEnd:
+    """Append the samples of a run, block by block, and return how it ended.
 
     Raises
     ------
@@ -142,30 +142,32 @@ def collect(job: Job, grid: TimeGrid, samples: list[Sample], *, live: bool) -> R
         With ``partial``, the trajectory so far.
     """
     try:
-        marching = run_loop(job.plant, stepper_of(job), grid)
+        marching = in_blocks(run_loop(job.plant, stepper_of(job), grid))
+        time, depth = 0.0, job.scene.insertion.first_depth
         while True:
-            last = samples[-1] if samples else None
             try:
-                with failing_as_step(last.time if last else 0.0, last.depth if last else job.scene.insertion.first_depth):
-                    sample = next(marching)
+                with failing_as_step(time, depth):
+                    block = next(marching)
             except StopIteration as finished:
-                if last is not None and last.time < grid.outputs[-1]:
+                if blocks and time < grid.outputs[-1]:
                     job.observer.progress(1.0)  # it ended before its time
                 return finished.value
-            samples.append(sample)
-            job.observer.progress(sample.time / grid.outputs[-1])
+            blocks.append(block)
+            time, depth = float(block.time[-1]), float(block.depth[-1])
+            job.observer.progress(time / grid.outputs[-1])
             if live:
-                job.observer.sample(sample)
+                job.observer.samples(block)
     except KeyboardInterrupt:
-        if not samples:
+        if not blocks:
             raise
         return RunEnd("interrupted", grid.steps)
     except ComputationError as error:
-        error.partial = trajectory_of(job, grid, samples, None, RunEnd("failed", grid.steps)) if samples else None
+        end = RunEnd("failed", grid.steps)
+        error.partial = trajectory_of(job, grid, joined(blocks), None, end) if blocks else None
         raise
 
 
-def trajectory_of(job: Job, grid: TimeGrid, samples: list[Sample], time_error: float | None, end: RunEnd) -> Trajectory:
+def trajectory_of(job: Job, grid: TimeGrid, samples: Samples, time_error: float | None, end: RunEnd) -> Trajectory:
     """Return samples and summary; ``time_error`` is what the steps are estimated to cost, None where nobody knows."""
     now = clock.perf_counter()
     run = trajectory_from_samples(job.plant, samples, {}, job.scene)

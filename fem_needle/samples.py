@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from time import perf_counter
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +13,15 @@ from numpy.typing import NDArray
 from fem_needle import axial, banded
 from fem_needle.ledger import StepEnd, Works, axial_momentum, configuration_force, energies
 from fem_needle.plant import Plant
+from fem_needle.sample_arrays import OVER_TIME, Samples
 from fem_needle.stages import internal_force
 from fem_needle.steppers import Step
 
 Array = NDArray[np.float64]
+Ending = TypeVar("Ending")
+
+FEW = 4  # samples of a block: a loop that gives them one by one is watched as it goes
+PATIENCE = 0.5  # s: a block waits no longer for another sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +59,31 @@ class Sample:
     path_position: Array
     path_deflection: Array
 
-    @property
-    def lateral_energy(self) -> float:
-        """Kinetic, bending and tissue energy together [J]."""
-        return self.kinetic_energy + self.bending_energy + self.tissue_energy
+
+def stacked(samples: Sequence[Sample]) -> Samples:
+    """Return samples, at least one, in order of time, as rows of arrays."""
+    over_time = {name: np.array([getattr(sample, name) for sample in samples]) for name in OVER_TIME if name != "path_points"}
+    points, last = np.array([len(sample.path_position) for sample in samples]), samples[-1]
+    return Samples(**over_time, path_position=last.path_position, path_deflection=last.path_deflection, path_points=points)
+
+
+def in_blocks(marching: Generator[Sample, None, Ending]) -> Generator[Samples, None, Ending]:
+    """Yield the samples of a loop as rows of arrays, a few at a time; what it has given is yielded before it fails."""
+    pending, since = list[Sample](), perf_counter()
+    while True:
+        try:
+            pending.append(next(marching))
+        except StopIteration as finished:
+            if pending:
+                yield stacked(pending)
+            return finished.value
+        except BaseException:  # also an interrupt
+            if pending:
+                yield stacked(pending)
+            raise
+        if len(pending) == FEW or perf_counter() - since > PATIENCE:
+            yield stacked(pending)
+            pending, since = [], perf_counter()
 
 
 def sample_step(

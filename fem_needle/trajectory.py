@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from fem_needle.display import Card, Shown, in_millimeters, without_rounding
 from fem_needle.plant import Plant
-from fem_needle.samples import Sample
+from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene, as_function
 from fem_needle.time_integrals import twice_integrated
 
@@ -143,12 +142,7 @@ class Trajectory(Shown):
         stations = self.arc_length if arc_length is None else np.asarray(arc_length, dtype=float)
         if self.plant is None or self.coordinates is None or self.point_forces is None:
             return np.stack([self._from_stations(row, stations, derivative) for row in range(len(self.time))])
-        return np.stack(
-            [
-                self.plant.deflection(coordinates, forces, depth, stations, derivative)
-                for coordinates, forces, depth in zip(self.coordinates, self.point_forces, self.depth, strict=True)
-            ]
-        )
+        return self.plant.deflection(self.coordinates, self.point_forces, self.depth, stations, derivative)
 
     def _from_stations(self, row: int, stations: Array, derivative: int) -> Array:
         values, start = self.station_deflection[row], -np.inf
@@ -180,21 +174,21 @@ class Trajectory(Shown):
 
 
 def trajectory_from_samples(
-    plant: Plant, samples: Sequence[Sample], summary: dict[str, Any], scene: Scene | None = None
+    plant: Plant, samples: Samples, summary: dict[str, Any], scene: Scene | None = None
 ) -> Trajectory:
-    """Collect samples, in order of time, into a trajectory.
+    """Return the trajectory of all samples of a run, at least one.
 
     ``scene`` holds the run's settings where they differ from those of the plant's own scene.
     """
     scene, length = scene or plant.scene, plant.scene.needle.length
     stations = np.linspace(0.0, length, scene.numerics.output_points)
-    shapes = np.stack([plant.deflection(s.coordinates, s.point_forces, s.depth, stations) for s in samples])
-    series = {name: np.array([getattr(s, name) for s in samples]) for name in _FROM_SAMPLES}
-    tip = np.array([length])
+    state = (samples.coordinates, samples.point_forces, samples.depth)
+    shapes = plant.deflection(*state, stations)
+    series: dict[str, Array] = {name: getattr(samples, name) for name in _FROM_SAMPLES}
     series["tip_deflection"] = shapes[:, -1].copy()
-    series["tip_angle"] = np.array([plant.deflection(s.coordinates, s.point_forces, s.depth, tip, 1)[0] for s in samples])
+    series["tip_angle"] = plant.deflection(*state, np.array([length]), 1)[:, 0]
     series["hub_angle"] = _hub_angles(plant, samples)
-    energy = np.array([s.lateral_energy for s in samples])
+    energy = samples.lateral_energy
     gained = series["load_work"] + series["hub_work"] + series["tissue_work"] + series["boundary_energy"]
     series["energy_residual"] = energy - energy[0] - (gained - series["tissue_dissipation"])
     axial = series["axial_kinetic_energy"] - series["axial_kinetic_energy"][0]
@@ -204,29 +198,28 @@ def trajectory_from_samples(
     series["axial_energy_residual"] = axial + taken - series["push_work"]
     return Trajectory(
         scene=scene,
-        time=np.array([s.time for s in samples]),
+        time=samples.time,
         series={name: series[name] for name in VARIABLES},
-        guide_force=np.stack([s.guide_force for s in samples]),
+        guide_force=samples.guide_force,
         arc_length=stations,
         station_deflection=shapes,
-        path_position=samples[-1].path_position,
-        path_deflection=samples[-1].path_deflection,
+        path_position=samples.path_position,
+        path_deflection=samples.path_deflection,
         summary=summary,
         plant=plant,
-        coordinates=np.stack([s.coordinates for s in samples]),
-        point_forces=np.stack([s.point_forces for s in samples]),
+        coordinates=samples.coordinates,
+        point_forces=samples.point_forces,
     )
 
 
-def _hub_angles(plant: Plant, samples: Sequence[Sample]) -> Array:
+def _hub_angles(plant: Plant, samples: Samples) -> Array:
     """Return the hub's angle [rad]: of the bent needle, or under ``entry`` of a free hub that its torque alone turns."""
     support = plant.scene.support
     if support.kind == "hub":
-        hub = np.zeros(1)
-        return np.array([plant.deflection(s.coordinates, s.point_forces, s.depth, hub, 1)[0] for s in samples])
+        return plant.deflection(samples.coordinates, samples.point_forces, samples.depth, np.zeros(1), 1)[:, 0]
     if support.hub_rotational_inertia is None:
         return np.zeros(len(samples))
-    return twice_integrated(as_function(support.hub_torque), [s.time for s in samples]) / support.hub_rotational_inertia
+    return twice_integrated(as_function(support.hub_torque), samples.time.tolist()) / support.hub_rotational_inertia
 
 
 def energy_warnings(run: Trajectory) -> list[str]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fem_needle.atomic_file import write_atomically
 from fem_needle.plant import Plant
-from fem_needle.samples import Sample
+from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene, as_function
 from fem_needle.tissue_block import TissueBlock, tissue_block
 from fem_needle.trajectory import Trajectory
@@ -58,14 +58,14 @@ class Frame:
         return np.interp(positions, self.path_position, self.path_deflection, left=0.0, right=0.0)
 
 
-def frame_of_sample(plant: Plant, sample: Sample, arc_length: Array) -> Frame:
-    """Return the frame of a sample at stations from the hub, 0, to the tip, l [m]."""
-    values = [
-        plant.deflection(sample.coordinates, sample.point_forces, sample.depth, arc_length, derivative)
-        for derivative in (0, 2, 3)
+def frames_of_samples(plant: Plant, samples: Samples, arc_length: Array) -> list[Frame]:
+    """Return the frames of samples at stations from the hub, 0, to the tip, l [m]."""
+    state = (samples.coordinates, samples.point_forces, samples.depth)
+    shapes, curvatures, thirds = (plant.deflection(*state, arc_length, derivative) for derivative in (0, 2, 3))
+    return [
+        Frame(time, depth, shapes[row], curvatures[row], thirds[row], *samples.path_at(row))
+        for row, (time, depth) in enumerate(zip(samples.time.tolist(), samples.depth.tolist(), strict=True))
     ]
-    shape = (values[0], values[1], values[2])
-    return Frame(sample.time, sample.depth, *shape, sample.path_position, sample.path_deflection)
 
 
 def frames_of_run(run: Trajectory, first: int = 0) -> list[Frame]:

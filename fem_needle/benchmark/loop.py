@@ -14,7 +14,7 @@ from fem_needle.benchmark.methods import TooSlowError
 from fem_needle.choices import choose
 from fem_needle.errors import SuspiciousValueWarning
 from fem_needle.plant import Plant
-from fem_needle.samples import Sample
+from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene
 from fem_needle.simulation import run_scene, simulate
 
@@ -49,8 +49,8 @@ class Watch:
         if clock.perf_counter() > self._end:
             raise TooSlowError(f"stopped after {self._limit:g} s")
 
-    def sample(self, sample: Sample) -> None:
-        """Ignore a sample."""
+    def samples(self, block: Samples) -> None:
+        """Ignore samples."""
 
 
 def whole_loop(plant: Plant) -> Callable[[], Array]:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from fem_needle.plant import Plant
-    from fem_needle.samples import Sample
+    from fem_needle.sample_arrays import Samples
 
 PATIENCE = 1.0  # s
 LONGEST_TITLE = 36  # characters: a longer one leaves no room for the bar
@@ -41,7 +41,7 @@ class ProgressBar:
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=fraction)
 
-    def sample(self, sample: Sample) -> None:
+    def samples(self, block: Samples) -> None:
         """Ignore."""
 
     def stop(self) -> None:
@@ -77,7 +77,7 @@ class Observers:
         for observer in self._observers:
             observer.progress(fraction)
 
-    def sample(self, sample: Sample) -> None:
+    def samples(self, block: Samples) -> None:
         """Tell all."""
         for observer in self._observers:
-            observer.sample(sample)
+            observer.samples(block)

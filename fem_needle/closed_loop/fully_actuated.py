@@ -34,7 +34,7 @@ from fem_needle.loads import load_case
 from fem_needle.march import output_times
 from fem_needle.motion import Instant, depth_law
 from fem_needle.plant import Plant
-from fem_needle.samples import Sample, sample_step
+from fem_needle.samples import Sample, sample_step, stacked
 from fem_needle.scene import Scene
 from fem_needle.skipping import unneeded_terms
 from fem_needle.stages import StageSolution, evaluate_stage, internal_force, momentum
@@ -239,7 +239,7 @@ def _sample(plant: Plant, step: Step, works: Works, *, at_start: bool) -> Sample
 
 def _trajectory(plant: Plant, run: _Account, outputs: tuple[float, ...], elapsed: float) -> Trajectory:
     scene, samples = plant.scene, run.samples
-    found = trajectory_from_samples(plant, samples, {}, scene)
+    found = trajectory_from_samples(plant, stacked(samples), {}, scene)
     arrival, efforts = first_arrival(scene, samples[0].depth, float(found.tip_deflection[0])), {}
     for time, depth, tip in zip(found.time, found.depth, found.tip_deflection, strict=True):
         arrival = arrival.followed(scene, float(time), float(depth), float(tip))

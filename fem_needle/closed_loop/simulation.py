@@ -23,7 +23,7 @@ from fem_needle.march import ends_by_itself
 from fem_needle.motion import run_duration
 from fem_needle.plant import Plant
 from fem_needle.run_job import time_stepper
-from fem_needle.samples import Sample
+from fem_needle.samples import Sample, stacked
 from fem_needle.scene import Scene
 from fem_needle.sensing.rig import SensorRig
 from fem_needle.skipping import Skipped, unneeded_terms
@@ -204,7 +204,7 @@ class Simulation:
         stop_reason = stop_reason or self.stop_reason
         if stop_reason != "interrupted" and self.time > rows[-1].time:
             rows.append(self._row())
-        run = trajectory_from_samples(self.plant, [row.sample() for row in rows], {}, self.scene)
+        run = trajectory_from_samples(self.plant, stacked([row.sample() for row in rows]), {}, self.scene)
         run.signals.update(self._signal_arrays(rows))
         run.summary.update(
             self.plant.describe()

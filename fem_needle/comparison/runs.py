@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fem_needle.comparison.at_rest import shape_stations
 from fem_needle.errors import ComputationError
 from fem_needle.plant import Plant
-from fem_needle.samples import Sample
+from fem_needle.sample_arrays import Samples
 from fem_needle.simulation import simulate
 from fem_needle.trajectory import Trajectory
 
@@ -99,7 +99,7 @@ class _Stopwatch:
             self.started = now
         self._fraction, self.ended = fraction, now
 
-    def sample(self, sample: Sample) -> None:
+    def samples(self, block: Samples) -> None:
         """Ignore."""
 
 

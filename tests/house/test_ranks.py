@@ -20,6 +20,8 @@ RANKS = {
     "shapes": 2,
     "path": 0,
     "piecewise": 0,
+    "row_blocks": 0,
+    "sample_arrays": 0,
     "shipped": 0,
     "atomic_file": 0,
     "folder_lock": 0,

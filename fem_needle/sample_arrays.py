@@ -1,0 +1,114 @@
+"""What is known of a run at its output times: arrays over time, a row for each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Selection = slice | NDArray[np.bool_] | NDArray[np.integer]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """State, forces and ledger at output times that rise, T of them; SI.
+
+    The names are those of ``series.nc`` (docs/contract.md), with ``coordinates``, ``point_forces`` and ``path_points`` besides.
+
+    Attributes
+    ----------
+    time, depth, speed
+        [s], [m], [m/s], shape (T,).
+    coordinates
+        Of the plant, shape (T, n).
+    point_forces
+        On guides, at lateral loads and at the tip, as `fem_needle.plant.Points` orders them [N], shape (T, p).
+    guide_force
+        Of each guide on the needle [N], shape (T, guides).
+    push_force, friction_force, tissue_force, hub_force
+        [N], shape (T,).
+    hub_moment
+        [N m], shape (T,).
+    kinetic_energy, bending_energy, tissue_energy, guide_energy
+        Lateral energies [J], shape (T,).
+    load_work, hub_work, tissue_work, tissue_dissipation, boundary_energy
+        Of the lateral balance, since the start of the run [J], shape (T,).
+    friction_dissipation, cutting_work, push_work, arrest_loss
+        Of the axial balance, since the start of the run [J], shape (T,).
+    axial_kinetic_energy
+        [J], shape (T,).
+    path_position, path_deflection
+        The path that the tip has cut, y and r [m], at the last row; shape (points,), empty without one.
+    path_points
+        How many of these points each row has, shape (T,): the path only grows, that of a row is a prefix.
+    """
+
+    time: Array
+    depth: Array
+    speed: Array
+    coordinates: Array
+    point_forces: Array
+    guide_force: Array
+    push_force: Array
+    friction_force: Array
+    tissue_force: Array
+    hub_force: Array
+    hub_moment: Array
+    kinetic_energy: Array
+    bending_energy: Array
+    tissue_energy: Array
+    guide_energy: Array
+    load_work: Array
+    hub_work: Array
+    tissue_work: Array
+    tissue_dissipation: Array
+    boundary_energy: Array
+    friction_dissipation: Array
+    cutting_work: Array
+    push_work: Array
+    arrest_loss: Array
+    axial_kinetic_energy: Array
+    path_position: Array
+    path_deflection: Array
+    path_points: Integers
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def lateral_energy(self) -> Array:
+        """Kinetic, bending and tissue energy together [J], shape (T,)."""
+        return self.kinetic_energy + self.bending_energy + self.tissue_energy
+
+    def rows(self, selection: Selection) -> Samples:
+        """Return some of the rows, with the path as far as they have it.
+
+        Parameters
+        ----------
+        selection
+            A slice, a mask (T,) or indices (rows,), in order of time.
+        """
+        chosen = {name: getattr(self, name)[selection] for name in OVER_TIME}
+        points = int(np.max(chosen["path_points"], initial=0))
+        return Samples(**chosen, path_position=self.path_position[:points], path_deflection=self.path_deflection[:points])
+
+    def path_at(self, row: int) -> tuple[Array, Array]:
+        """Return the path at a row, y and r [m], shape (points,) each."""
+        points = self.path_points[row]
+        return self.path_position[:points], self.path_deflection[:points]
+
+
+OVER_TIME = tuple(field.name for field in fields(Samples) if field.name not in {"path_position", "path_deflection"})
+
+
+def joined(blocks: Sequence[Samples]) -> Samples:
+    """Return the rows of several blocks of one run, at least one, in their order; the path is that of the longest."""
+    if len(blocks) == 1:
+        return blocks[0]
+    longest = max(blocks, key=lambda block: len(block.path_position))
+    chosen = {name: np.concatenate([getattr(block, name) for block in blocks]) for name in OVER_TIME}
+    return Samples(**chosen, path_position=longest.path_position, path_deflection=longest.path_deflection)
