@@ -66,7 +66,7 @@ def run_scene(
     output_step
         Time between samples [s].
     observer
-        Receives each sample.
+        Is told the samples, a few at a time, while they are computed (`fem_needle.run_job.Observer`).
 
     Returns
     -------
@@ -127,7 +127,7 @@ def simulate(
     tolerance
         Largest tip error over the run / largest magnitude of the tip deflection.
     observer
-        Is told the samples while they are computed.
+        Is told the samples, a few at a time, while they are computed (`fem_needle.run_job.Observer`).
     """
     values = {
         "numerics.time_step": time_step,
