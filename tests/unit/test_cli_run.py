@@ -174,13 +174,13 @@ def test_explain(run):
 
 @pytest.mark.parametrize("options", [(), ("--json",)])
 def test_a_failed_computation_says_where_its_rows_are(run, monkeypatch, tmp_path, options):
-    def failing(self, sample):
-        original(self, sample)
-        if sample.time >= 1.0:
+    def failing(self, block):
+        original(self, block)
+        if block.time[-1] >= 1.0:
             raise ComputationError("the step at time 1 s, depth 0.03 m failed: use a smaller time_step")
 
-    original = RunFolderWriter.sample
-    monkeypatch.setattr(RunFolderWriter, "sample", failing)
+    original = RunFolderWriter.samples
+    monkeypatch.setattr(RunFolderWriter, "samples", failing)
     status, out, err = run("thesis", *SHORT, *options)
     assert status == 1
     assert err.startswith("error: the step at time 1 s, depth 0.03 m failed")
