@@ -1,0 +1,360 @@
+"""The loop over time steps: from breakpoint to breakpoint in compiled code, all samples of the way as rows of an array.
+
+The only entrance for steps of any needle (equilibria: `fem_needle.dynamics.rest_loop`). What the arrays hold: `names`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, integers_1
+from fem_needle.dynamics.axial import cutting_work
+from fem_needle.dynamics.compilation import entrance, inner, stage
+from fem_needle.dynamics.instant import prepare_matrices, prepare_points, set_loads, set_motion, set_place
+from fem_needle.dynamics.lateral import solve_nodes
+from fem_needle.dynamics.names import (
+    ACCELERATION,
+    AHEAD,
+    AXIAL_FORCE,
+    AXIAL_STATE,
+    BOUNDARY,
+    CHANGED,
+    CLAMP,
+    COUNTED,
+    COURSES,
+    CURSOR,
+    CUTS,
+    CUTTING_LIMIT,
+    CUTTING_WORK,
+    DEEPEST,
+    DIRECTION,
+    DIVERGED,
+    DONE,
+    END,
+    EVENT,
+    EVENTS,
+    FAILED,
+    FORCES,
+    FRAME,
+    HELD,
+    INERTIA,
+    INSTANT_SUMS,
+    INTERVALS,
+    INWARD,
+    IS_PUSHED,
+    KEPT_AXIAL,
+    KEPT_HELD,
+    KEPT_LATERAL,
+    KEPT_LEDGER,
+    KNOWN,
+    LANDED,
+    LAST_ANGLE_RATE,
+    LAST_HUB_RATE,
+    LAST_LENGTH,
+    LATERAL,
+    LAYER,
+    LEDGER_STATE,
+    LEVEL,
+    LIMITS,
+    MATERIAL,
+    METHOD,
+    MOMENTA,
+    NODE_PACE_1,
+    NODE_PACE_2,
+    NOW,
+    NUMBER,
+    OTHER_CHANGED,
+    OUTWARD,
+    OWN_DEPTH,
+    PACE,
+    PAIR,
+    PATH_COUNT,
+    PENDING,
+    PLACES,
+    PUSH_SIGNAL,
+    PUSH_WORK,
+    R_FRICTION,
+    R_PUSH,
+    RECORDS,
+    ROUNDS,
+    SIDE,
+    SIGNAL_ENDS,
+    SIGNALS,
+    SPEED,
+    START,
+    STEPS,
+    SWITCH,
+    TIME,
+    WAY,
+    WEIGHTS,
+)
+from fem_needle.dynamics.points import finite
+from fem_needle.dynamics.record import axial_force, keep_output
+from fem_needle.dynamics.signals import row_at, value_of
+from fem_needle.dynamics.stepping import (
+    complete_nodes,
+    end_speed,
+    extend_path,
+    finish,
+    land,
+    push_speeds,
+    set_end_forces,
+    set_given_motion,
+    set_pushed_motion,
+    set_velocities,
+)
+from fem_needle.dynamics.works import add_ends, add_node, row_correction, set_sums
+
+MOST_ROUNDS = 60
+KINK, CONTINUED = 1.0, 2.0  # of LANDED: what precedes the step; the latter is the start of a call
+SAME_SPEED, ROUNDED_SPEED = 1e-15, 1e-6  # of the largest speed of a step: the same; no longer approached because of rounding
+
+
+@inner
+def copy_row(source, target):
+    """Copy an array of one axis."""
+    for i in range(len(source)):
+        target[i] = source[i]
+
+
+@inner
+def keep_state(arrays, is_kept):
+    """Keep the state at the start of a step, or put it back."""
+    lateral, kept = floats_3(arrays, LATERAL)[0], floats_2(arrays, KEPT_LATERAL)
+    axial, ledger, held = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LEDGER_STATE), floats_1(arrays, HELD)
+    for row in range(2):
+        copy_row(lateral[row] if is_kept else kept[row], kept[row] if is_kept else lateral[row])
+    copy_row(axial if is_kept else floats_1(arrays, KEPT_AXIAL), floats_1(arrays, KEPT_AXIAL) if is_kept else axial)
+    copy_row(ledger if is_kept else floats_1(arrays, KEPT_LEDGER), floats_1(arrays, KEPT_LEDGER) if is_kept else ledger)
+    copy_row(held if is_kept else floats_1(arrays, KEPT_HELD), floats_1(arrays, KEPT_HELD) if is_kept else held)
+
+
+@stage
+def begin_step(arrays, t, middle):
+    """Set the instant at the start of a step: that of the last step's end, or, where there was none in this call, anew."""
+    axial, limits, course = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LIMITS), floats_2(arrays, COURSES)
+    clamp, momenta, lateral = floats_3(arrays, CLAMP), floats_2(arrays, MOMENTA), floats_3(arrays, LATERAL)[0]
+    if axial[LANDED] == 0.0:
+        copy_row(course[END], course[START])
+        for row in range(3):
+            copy_row(clamp[END, row], clamp[START, row])
+        copy_row(floats_2(arrays, FORCES)[END], floats_2(arrays, FORCES)[START])
+        copy_row(floats_2(arrays, KNOWN)[END], floats_2(arrays, KNOWN)[START])
+        copy_row(floats_2(arrays, INSTANT_SUMS)[END], floats_2(arrays, INSTANT_SUMS)[START])
+    else:
+        at = START if axial[LANDED] > 0.0 else END
+        if limits[IS_PUSHED] != 0.0:
+            course[START, TIME], course[START, OWN_DEPTH], course[START, SPEED] = t, axial[WAY], axial[PACE]
+            course[START, ACCELERATION], course[START, SIDE] = 0.0, limits[AHEAD]
+        else:
+            set_motion(t, middle, floats_2(arrays, SIGNALS), integers_1(arrays, SIGNAL_ENDS), course[START])
+        set_place(integers_1(arrays, SWITCH), floats_1(arrays, NUMBER), course[START])
+        set_loads(arrays, at, middle)
+        prepare_matrices(arrays, at, integers_1(arrays, OTHER_CHANGED))
+        prepare_points(arrays, at)
+        land(arrays, limits[COUNTED] != 0.0 and axial[LANDED] == KINK)
+    momenta[START, 0], momenta[START, 1] = lateral[1, 0], lateral[1, 1]
+
+
+@stage
+def solve_round(arrays, t, h, until, first, second, last, is_first):
+    """Solve the stages for a motion that is given, or tried."""
+    limits, middle = floats_1(arrays, LIMITS), t + 0.5 * h
+    if limits[IS_PUSHED] != 0.0:
+        set_pushed_motion(arrays, t, h, until, first, second, last)
+    else:
+        set_given_motion(arrays, t, h, until)
+    if is_first:
+        for at in (0, 1, END):
+            set_loads(arrays, at, middle)
+    for s in range(2):
+        prepare_matrices(arrays, s, integers_1(arrays, CHANGED))
+        prepare_points(arrays, s)
+    solve_nodes(arrays, h)
+    if integers_1(arrays, SWITCH)[CUTS]:
+        complete_nodes(arrays)
+
+
+@stage
+def solve_stages(arrays, t, h, until):
+    """Solve the stages of a step, of a push until the axial equations give the speeds with which they were solved."""
+    axial, limits, course = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LIMITS), floats_2(arrays, COURSES)
+    places, pair = floats_2(arrays, METHOD)[PLACES], floats_1(arrays, PAIR)
+    first, second, before, begin = axial[PACE], axial[PACE], np.inf, 0.0
+    if axial[LANDED] != KINK and axial[LAST_LENGTH] > 0.0:
+        slope = (axial[NODE_PACE_2] - axial[NODE_PACE_1]) / (places[1] - places[0]) * (h / axial[LAST_LENGTH])
+        first, second = axial[PACE] + slope * places[0], axial[PACE] + slope * places[1]
+    if limits[DIRECTION] == 0.0:
+        first, second = 0.0, 0.0
+    for count in range(MOST_ROUNDS):
+        solve_round(arrays, t, h, until, first, second, second, count == 0)
+        if limits[IS_PUSHED] == 0.0:
+            return DONE
+        for s in range(2):
+            set_sums(arrays, s, count >= 0)
+        axial[ROUNDS] += 1.0
+        if limits[DIRECTION] == 0.0:
+            return DONE
+        begin = push_speeds(arrays, h, t + 0.5 * h)
+        change, largest = max(abs(pair[8] - first), abs(pair[9] - second)), max(abs(pair[8]), abs(pair[9]))
+        first, second = pair[8], pair[9]
+        if not np.isfinite(change):
+            return DIVERGED
+        if change <= SAME_SPEED * largest or before <= change <= ROUNDED_SPEED * largest:
+            pair[10] = begin
+            return DONE
+        before = change
+    return DIVERGED
+
+
+@stage
+def end_step(arrays, t, h, until, is_output):
+    """Set the state at the end of a step; returns FAILED where it is not finite."""
+    limits, switches, pair = floats_1(arrays, LIMITS), integers_1(arrays, SWITCH), floats_1(arrays, PAIR)
+    is_pushed, first, second = limits[IS_PUSHED] != 0.0, pair[8], pair[9]
+    finish(arrays)
+    whole = is_output or is_pushed or switches[FRAME] != MATERIAL
+    if is_pushed and limits[DIRECTION] != 0.0:
+        # Matrices first: dT/dv is part of the momentum along the axis.
+        prepare_matrices(arrays, END, integers_1(arrays, OTHER_CHANGED))
+        set_pushed_motion(arrays, t, h, until, first, second, end_speed(arrays, pair[10], first, second))
+    if whole:
+        prepare_matrices(arrays, END, integers_1(arrays, OTHER_CHANGED))
+    prepare_points(arrays, END)
+    set_end_forces(arrays, 2)
+    set_velocities(arrays, END)
+    if switches[CUTS]:
+        extend_path(arrays)
+    axial = floats_1(arrays, AXIAL_STATE)
+    axial[DEEPEST] = max(axial[DEEPEST], floats_2(arrays, COURSES)[END, OWN_DEPTH])
+    set_sums(arrays, END, whole)
+    return DONE if finite(floats_2(arrays, KNOWN)[END]) else FAILED
+
+
+@stage
+def book_step(arrays, h, is_last):
+    """Add the works of a step; ``is_last``: it may be the last of a row of equal steps."""
+    axial, ledger, switches = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LEDGER_STATE), integers_1(arrays, SWITCH)
+    course, limits, weights = floats_2(arrays, COURSES), floats_1(arrays, LIMITS), floats_2(arrays, METHOD)[WEIGHTS]
+    is_pushed, moves = limits[IS_PUSHED] != 0.0, False
+    for at in (0, 1, END, START):
+        moves = moves or course[at, SPEED] != 0.0 or course[at, ACCELERATION] != 0.0
+    starts = axial[LANDED] == KINK or abs(axial[LAST_LENGTH] - h) > 1e-9 * h
+    corrects = switches[INERTIA] != 0 and moves and (is_last or starts)
+    if not is_pushed and (corrects or not switches[INERTIA]):
+        for s in range(2):
+            set_sums(arrays, s, corrects)
+    if starts:
+        ledger[BOUNDARY] += axial[PENDING]
+        if corrects:
+            ledger[BOUNDARY] += row_correction(arrays, 0, h)
+    axial[PENDING] = row_correction(arrays, 1, h) if corrects else 0.0
+    for s in range(2):
+        add_node(arrays, s, weights[s] * h)
+    add_ends(arrays, h)
+    if is_pushed:
+        rows = floats_2(arrays, SIGNALS)
+        row = rows[row_at(rows, integers_1(arrays, SIGNAL_ENDS), PUSH_SIGNAL, course[0, TIME])]
+        for s in range(2):
+            ledger[PUSH_WORK] += weights[s] * h * value_of(row, course[s, TIME]) * course[s, SPEED]
+            ledger[CUTTING_WORK] += weights[s] * h * limits[CUTTING_LIMIT] * course[s, SPEED]
+    else:
+        ledger[CUTTING_WORK] += cutting_work(floats_2(arrays, LAYER), floats_1(arrays, KEPT_AXIAL)[DEEPEST], axial[DEEPEST])
+
+
+@inner
+def arrive(arrays, h, until):
+    """Let the state stand at the end of a step."""
+    axial, course, clamp = floats_1(arrays, AXIAL_STATE), floats_2(arrays, COURSES), floats_3(arrays, CLAMP)
+    axial[NOW], axial[WAY], axial[PACE] = until, course[END, OWN_DEPTH], course[END, SPEED]
+    axial[NODE_PACE_1], axial[NODE_PACE_2] = course[0, SPEED], course[1, SPEED]
+    axial[LAST_HUB_RATE], axial[LAST_ANGLE_RATE] = clamp[END, 1, 0], clamp[END, 1, 1]
+    axial[LAST_LENGTH], axial[LANDED], axial[STEPS] = h, 0.0, axial[STEPS] + 1.0
+
+
+@inner
+def happened(arrays, until, middle):
+    """Return whether a push has passed a level, stopped, or broken away."""
+    axial, limits, rows = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LIMITS), floats_2(arrays, SIGNALS)
+    direction = limits[DIRECTION]
+    if limits[EVENTS] == 0.0:
+        return False
+    if direction != 0.0:
+        return (axial[WAY] - limits[LEVEL]) * direction >= 0.0 or axial[PACE] * direction <= 0.0
+    row = rows[row_at(rows, integers_1(arrays, SIGNAL_ENDS), PUSH_SIGNAL, middle)]
+    driving = value_of(row, until) + axial[AXIAL_FORCE]
+    return driving > limits[INWARD] or driving < -limits[OUTWARD]
+
+
+@stage
+def keep_row(arrays, at, time, middle, h, deepest, force, pace):
+    """Keep an output; of a push, the push itself, and at rest what friction takes of it."""
+    rows, cursor = floats_2(arrays, SIGNALS), integers_1(arrays, CURSOR)
+    row = floats_2(arrays, RECORDS)[cursor[2]]
+    keep_output(arrays, at, 2, h, deepest, row)
+    if floats_1(arrays, LIMITS)[IS_PUSHED] != 0.0:
+        row[R_PUSH] = value_of(rows[row_at(rows, integers_1(arrays, SIGNAL_ENDS), PUSH_SIGNAL, middle)], time)
+        if pace == 0.0:
+            row[R_FRICTION] = row[R_PUSH] + force
+    cursor[2] += 1
+
+
+@stage
+def take_step(arrays, t, h, until, is_last, is_output):
+    """Take a step and keep its output; a step that fails or in which something happens leaves the state as it was."""
+    axial, ledger, cursor = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LEDGER_STATE), integers_1(arrays, CURSOR)
+    middle, pieces = t + 0.5 * h, integers_1(arrays, PATH_COUNT)[0]
+    keep_state(arrays, h > 0.0)
+    begin_step(arrays, t, middle)
+    status = solve_stages(arrays, t, h, until)
+    if status == DONE:
+        status = end_step(arrays, t, h, until, is_output)
+    if status == DONE:
+        book_step(arrays, h, is_last)
+        arrive(arrays, h, until)
+        if floats_1(arrays, LIMITS)[IS_PUSHED] != 0.0:
+            axial[AXIAL_FORCE] = axial_force(arrays, END, 2, h)
+            if happened(arrays, until, middle):
+                status = EVENT
+    kept = floats_1(arrays, KEPT_AXIAL)
+    if status != DONE:
+        keep_state(arrays, h <= 0.0)
+        integers_1(arrays, PATH_COUNT)[0] = pieces
+        if axial[LANDED] == 0.0:
+            axial[LANDED] = CONTINUED
+        return status
+    for at in (START, END):
+        if at == START and cursor[3]:  # the start of the run
+            cursor[3] = 0
+            keep_row(arrays, at, t, middle, h, kept[DEEPEST], kept[AXIAL_FORCE], kept[PACE])
+        elif at == END and is_output:
+            ledger[BOUNDARY] += axial[PENDING]
+            keep_row(arrays, at, until, middle, h, axial[DEEPEST], axial[AXIAL_FORCE], axial[PACE])
+            ledger[BOUNDARY] -= axial[PENDING]
+    return status
+
+
+@entrance
+def run_steps(arrays):
+    """Take the steps of smooth intervals; returns how it ended (`names`: DONE, FAILED, EVENT, DIVERGED).
+
+    ``INTERVALS``: start and end [s], number of steps, and whether the end is an output (I, 4). ``CURSOR``: interval, step in it, rows
+    of the record so far, and whether the first step's start is an output too (4,); where the call stopped.
+    """
+    intervals, cursor, axial = floats_2(arrays, INTERVALS), integers_1(arrays, CURSOR), floats_1(arrays, AXIAL_STATE)
+    if axial[LANDED] == 0.0:
+        axial[LANDED] = CONTINUED  # what the last call left to work on may be another state's
+    while cursor[0] < intervals.shape[0]:
+        interval = intervals[cursor[0]]
+        steps = int(interval[2])
+        h = (interval[1] - interval[0]) / steps
+        while cursor[1] < steps:
+            is_last = cursor[1] + 1 == steps
+            t = interval[0] + cursor[1] * h
+            until = interval[1] if is_last else interval[0] + (cursor[1] + 1) * h
+            status = take_step(arrays, t, h, until, is_last, is_last and interval[3] != 0.0)
+            if status != DONE:
+                return status
+            cursor[1] += 1
+        cursor[0], cursor[1] = cursor[0] + 1, 0
+    return DONE
