@@ -82,27 +82,27 @@ def squared(cubic, a, b):
 
 
 @inner
-def row_of_block(capacity, level, block):
-    """Return where the moments of a block of 2^level pieces stand."""
-    return 2 * capacity - (2 * capacity >> level) + block
+def row_of_block(level, block):
+    """Return where the moments of a block of 2^level pieces stand: the blocks of all levels, in the order of their middles."""
+    return (block << (level + 1)) + (1 << level) - 1
 
 
 @inner
 def append_piece(end, cubic, count, edges, cubics, moments, squares, pascal):
     """Add a piece of the path and all blocks that it completes."""
-    capacity, orders = cubics.shape[0], moments.shape[1]
+    orders = moments.shape[1]
     span = end - edges[count]
     for i in range(4):
         cubics[count, i] = cubic[i]
     edges[count + 1] = end
     squares[count + 1] = squares[count] + squared(cubic, 0.0, span)
-    cubic_moments(cubic, 0.0, span, moments[row_of_block(capacity, 0, count)])
+    cubic_moments(cubic, 0.0, span, moments[row_of_block(0, count)])
     level, block = 1, (count + 1) >> 1
     while (block << level) == count + 1 and block > 0:
-        left, right = row_of_block(capacity, level - 1, 2 * block - 2), row_of_block(capacity, level - 1, 2 * block - 1)
+        left, right = row_of_block(level - 1, 2 * block - 2), row_of_block(level - 1, 2 * block - 1)
         start, middle = edges[(block - 1) << level], edges[((2 * block - 1) << (level - 1))]
         whole = end - start
-        target = moments[row_of_block(capacity, level, block - 1)]
+        target = moments[row_of_block(level, block - 1)]
         for k in range(orders):
             first = shifted(moments[left], pascal, 0.0, (middle - start) / whole, k)
             target[k] = first + shifted(moments[right], pascal, (middle - start) / whole, (end - middle) / whole, k)
@@ -146,7 +146,7 @@ def add_history(arrays, k, ya, yb, piece, course, load, load_rate):
     """Add what the pieces of the path between ya and yb, inside one piece of the shapes, add to H and dH/dz."""
     edges, cubics, kept = floats_1(arrays, PATH_EDGES), floats_2(arrays, PATH_CUBICS), floats_2(arrays, PATH_MOMENTS)
     count, moments = integers_1(arrays, PATH_COUNT)[0], floats_2(arrays, CUT_MOMENTS)[0]
-    first, last, capacity = locate(edges[: count + 1], ya), locate(edges[: count + 1], yb), cubics.shape[0]
+    first, last = locate(edges[: count + 1], ya), locate(edges[: count + 1], yb)
     if first == last:
         cubic_moments(cubics[first], ya - edges[first], yb - edges[first], moments)
         add_moments(arrays, k, ya, yb, moments, piece, course, load, load_rate)
@@ -162,12 +162,12 @@ def add_history(arrays, k, ya, yb, piece, course, load, load_rate):
     level = 0
     while first < last:
         if first & 1:
-            known = kept[row_of_block(capacity, level, first)]
+            known = kept[row_of_block(level, first)]
             add_moments(arrays, k, edges[first << level], edges[(first + 1) << level], known, piece, course, load, load_rate)
             first += 1
         if last & 1:
             last -= 1
-            known = kept[row_of_block(capacity, level, last)]
+            known = kept[row_of_block(level, last)]
             add_moments(arrays, k, edges[last << level], edges[(last + 1) << level], known, piece, course, load, load_rate)
         first, last, level = first >> 1, last >> 1, level + 1
 

@@ -25,8 +25,8 @@ from fem_needle.dynamics.names import (
     FIXED,
     FLEXIBLE,
     FLEXIBLE_RATE,
-    FORCE_RATES,
     FORCES,
+    FORCE_RATES,
     FRAME,
     FRESH,
     GUIDES,
@@ -39,12 +39,13 @@ from fem_needle.dynamics.names import (
     MODULUS,
     NUMBER,
     OWN_DEPTH,
+    OWN_SIDE,
     PIECE_NODES,
+    POINTS,
     POINT_FIRST,
     POINT_PLACES,
     POINT_RATES,
     POINT_ROWS,
-    POINTS,
     POSITION,
     PRINTED,
     PRINTED_ERRORS,
@@ -52,8 +53,8 @@ from fem_needle.dynamics.names import (
     RULE,
     SHAPE,
     SIDE,
-    SIGNAL_ENDS,
     SIGNALS,
+    SIGNAL_ENDS,
     SMALLEST_DEPTH,
     SPEED,
     STRETCH,
@@ -77,14 +78,14 @@ def set_motion(time, middle, rows, offsets, course):
     row = rows[row_at(rows, offsets, DEPTH_SIGNAL, middle)]
     course[TIME], course[OWN_DEPTH] = time, value_of(row, time)
     course[SPEED], course[ACCELERATION] = rate_of(row, time), curvature_of(row, time)
-    course[SIDE] = value_of(row, middle)
+    course[OWN_SIDE] = value_of(row, middle)
 
 
 @inner
 def set_place(switches, numbers, course):
     """Set what follows from the depth: that of the matrices, not less than the smallest, and the stretch."""
     course[DEPTH] = max(course[OWN_DEPTH], numbers[SMALLEST_DEPTH])
-    course[SIDE] = max(course[SIDE], numbers[SMALLEST_DEPTH])
+    course[SIDE] = max(course[OWN_SIDE], numbers[SMALLEST_DEPTH])
     course[STRETCH] = course[DEPTH] if switches[FRAME] == STRETCHED else 1.0
 
 

@@ -11,6 +11,7 @@ from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, integers_1
 from fem_needle.dynamics.axial import cutting_work
 from fem_needle.dynamics.compilation import entrance, inner, stage
 from fem_needle.dynamics.instant import prepare_matrices, prepare_points, set_loads, set_motion, set_place
+from fem_needle.dynamics.jumps import land
 from fem_needle.dynamics.lateral import solve_nodes
 from fem_needle.dynamics.names import (
     ACCELERATION,
@@ -20,7 +21,7 @@ from fem_needle.dynamics.names import (
     BOUNDARY,
     CHANGED,
     CLAMP,
-    COUNTED,
+    CONTINUED,
     COURSES,
     CURSOR,
     CUTS,
@@ -46,6 +47,7 @@ from fem_needle.dynamics.names import (
     KEPT_HELD,
     KEPT_LATERAL,
     KEPT_LEDGER,
+    KINK,
     KNOWN,
     LANDED,
     LAST_ANGLE_RATE,
@@ -66,6 +68,7 @@ from fem_needle.dynamics.names import (
     OTHER_CHANGED,
     OUTWARD,
     OWN_DEPTH,
+    OWN_SIDE,
     PACE,
     PAIR,
     PATH_COUNT,
@@ -73,13 +76,12 @@ from fem_needle.dynamics.names import (
     PLACES,
     PUSH_SIGNAL,
     PUSH_WORK,
-    R_FRICTION,
-    R_PUSH,
     RECORDS,
     ROUNDS,
-    SIDE,
-    SIGNAL_ENDS,
+    R_FRICTION,
+    R_PUSH,
     SIGNALS,
+    SIGNAL_ENDS,
     SPEED,
     START,
     STEPS,
@@ -96,7 +98,6 @@ from fem_needle.dynamics.stepping import (
     end_speed,
     extend_path,
     finish,
-    land,
     push_speeds,
     set_end_forces,
     set_given_motion,
@@ -106,7 +107,6 @@ from fem_needle.dynamics.stepping import (
 from fem_needle.dynamics.works import add_ends, add_node, row_correction, set_sums
 
 MOST_ROUNDS = 60
-KINK, CONTINUED = 1.0, 2.0  # of LANDED: what precedes the step; the latter is the start of a call
 SAME_SPEED, ROUNDED_SPEED = 1e-15, 1e-6  # of the largest speed of a step: the same; no longer approached because of rounding
 
 
@@ -130,7 +130,7 @@ def keep_state(arrays, is_kept):
 
 
 @stage
-def begin_step(arrays, t, middle):
+def begin_step(arrays, t, h):
     """Set the instant at the start of a step: that of the last step's end, or, where there was none in this call, anew."""
     axial, limits, course = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LIMITS), floats_2(arrays, COURSES)
     clamp, momenta, lateral = floats_3(arrays, CLAMP), floats_2(arrays, MOMENTA), floats_3(arrays, LATERAL)[0]
@@ -142,17 +142,17 @@ def begin_step(arrays, t, middle):
         copy_row(floats_2(arrays, KNOWN)[END], floats_2(arrays, KNOWN)[START])
         copy_row(floats_2(arrays, INSTANT_SUMS)[END], floats_2(arrays, INSTANT_SUMS)[START])
     else:
-        at = START if axial[LANDED] > 0.0 else END
+        at, middle = START, t + 0.5 * h
         if limits[IS_PUSHED] != 0.0:
             course[START, TIME], course[START, OWN_DEPTH], course[START, SPEED] = t, axial[WAY], axial[PACE]
-            course[START, ACCELERATION], course[START, SIDE] = 0.0, limits[AHEAD]
+            course[START, ACCELERATION], course[START, OWN_SIDE] = 0.0, limits[AHEAD]
         else:
             set_motion(t, middle, floats_2(arrays, SIGNALS), integers_1(arrays, SIGNAL_ENDS), course[START])
         set_place(integers_1(arrays, SWITCH), floats_1(arrays, NUMBER), course[START])
         set_loads(arrays, at, middle)
         prepare_matrices(arrays, at, integers_1(arrays, OTHER_CHANGED))
         prepare_points(arrays, at)
-        land(arrays, limits[COUNTED] != 0.0 and axial[LANDED] == KINK)
+        land(arrays, h)
     momenta[START, 0], momenta[START, 1] = lateral[1, 0], lateral[1, 1]
 
 
@@ -232,8 +232,8 @@ def end_step(arrays, t, h, until, is_output):
 
 
 @stage
-def book_step(arrays, h, is_last):
-    """Add the works of a step; ``is_last``: it may be the last of a row of equal steps."""
+def book_step(arrays, h, is_last, is_shown):
+    """Add the works of a step; ``is_last``: it may be the last of a row of equal steps; ``is_shown``: an output."""
     axial, ledger, switches = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LEDGER_STATE), integers_1(arrays, SWITCH)
     course, limits, weights = floats_2(arrays, COURSES), floats_1(arrays, LIMITS), floats_2(arrays, METHOD)[WEIGHTS]
     is_pushed, moves = limits[IS_PUSHED] != 0.0, False
@@ -241,7 +241,7 @@ def book_step(arrays, h, is_last):
         moves = moves or course[at, SPEED] != 0.0 or course[at, ACCELERATION] != 0.0
     starts = axial[LANDED] == KINK or abs(axial[LAST_LENGTH] - h) > 1e-9 * h
     corrects = switches[INERTIA] != 0 and moves and (is_last or starts)
-    if not is_pushed and (corrects or not switches[INERTIA]):
+    if not is_pushed and (corrects or is_shown or not switches[INERTIA]):
         for s in range(2):
             set_sums(arrays, s, corrects)
     if starts:
@@ -305,12 +305,12 @@ def take_step(arrays, t, h, until, is_last, is_output):
     axial, ledger, cursor = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LEDGER_STATE), integers_1(arrays, CURSOR)
     middle, pieces = t + 0.5 * h, integers_1(arrays, PATH_COUNT)[0]
     keep_state(arrays, h > 0.0)
-    begin_step(arrays, t, middle)
+    begin_step(arrays, t, h)
     status = solve_stages(arrays, t, h, until)
     if status == DONE:
         status = end_step(arrays, t, h, until, is_output)
     if status == DONE:
-        book_step(arrays, h, is_last)
+        book_step(arrays, h, is_last, is_output or cursor[3] != 0)
         arrive(arrays, h, until)
         if floats_1(arrays, LIMITS)[IS_PUSHED] != 0.0:
             axial[AXIAL_FORCE] = axial_force(arrays, END, 2, h)

@@ -60,8 +60,8 @@ ROW_START, ROW_VALUE, ROW_SLOPE, ROW_CURVE, ROW_AMPLITUDE, ROW_OMEGA, ROW_PHASE,
 ROW = 8
 
 # course: the insertion at an instant.
-TIME, DEPTH, SPEED, ACCELERATION, FACTOR, FACTOR_RATE, SIDE, STRETCH, OWN_DEPTH = range(9)
-COURSE = 9
+TIME, DEPTH, SPEED, ACCELERATION, FACTOR, FACTOR_RATE, SIDE, STRETCH, OWN_DEPTH, OWN_SIDE = range(10)
+COURSE = 10
 
 # axial: the part of the state that is no coordinate. MEMORY of the last step follows the motion.
 (
@@ -228,4 +228,5 @@ PLACES, WEIGHTS, END_SHARES, START_SLOPE, END_SLOPE = range(5)
 IS_PUSHED, DIRECTION, CUTTING_LIMIT, LEVEL, AHEAD, INWARD, OUTWARD, EVENTS, COUNTED = range(9)
 LIMITS_SIZE = 9
 
+KINK, CONTINUED = 1.0, 2.0  # of LANDED: what precedes a step; the latter is the start of a call
 ROUNDINGS = 1e-12  # of a depth: what a step may miss the deepest point by

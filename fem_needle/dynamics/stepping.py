@@ -29,14 +29,12 @@ from fem_needle.dynamics.names import (
     AXIAL_ACTS,
     AXIAL_STATE,
     BEAM,
-    BOUNDARY,
     CHOSEN,
     CLAMP,
     COEFFICIENTS,
     COMPLIANCE,
     COURSES,
     CUBIC,
-    CUTS,
     CUTTING_LIMIT,
     DEEPEST,
     DENSE,
@@ -52,23 +50,15 @@ from fem_needle.dynamics.names import (
     GAPS,
     GUIDES,
     HELD,
-    HUB_WORK,
     INERTIA,
     INSTANT_SUMS,
     INVERSE,
     KNOWN,
-    LAST_ANGLE_RATE,
     LAST_AXIAL_MOMENTUM,
-    LAST_AXIAL_PRODUCT,
-    LAST_HUB_PRODUCT,
-    LAST_HUB_RATE,
-    LAST_POWER,
-    LAST_PRODUCT,
     LATERAL,
     LAYER,
     LAYER_END,
     LAYER_START,
-    LEDGER_STATE,
     LENGTH,
     LIMITS,
     MASS,
@@ -78,12 +68,11 @@ from fem_needle.dynamics.names import (
     METHOD,
     MODULUS,
     MOMENTA,
-    NODE_PACE_1,
-    NODE_PACE_2,
     NODE_TIPS,
     NUMBER,
     OTHER_CUBIC,
     OWN_DEPTH,
+    OWN_SIDE,
     PACE,
     PAIR,
     PASCAL,
@@ -103,18 +92,16 @@ from fem_needle.dynamics.names import (
     PUSH_SIGNAL,
     RATES,
     ROUNDINGS,
-    S_CONFIGURATION,
-    S_MOMENTUM,
-    S_POWER,
     SHAPE,
     SIDE,
-    SIGNAL_ENDS,
     SIGNALS,
+    SIGNAL_ENDS,
     SOFTEST,
     SPEED,
-    START,
     STRETCH,
     SWITCH,
+    S_CONFIGURATION,
+    S_MOMENTUM,
     TIME,
     VECTORS,
     WAY,
@@ -122,7 +109,6 @@ from fem_needle.dynamics.names import (
 )
 from fem_needle.dynamics.points import along
 from fem_needle.dynamics.signals import row_at, value_of
-from fem_needle.dynamics.works import load_product, set_sums
 
 
 @inner
@@ -156,7 +142,7 @@ def set_pushed_motion(arrays, t, h, until, first, second, last):
     change = method[END_SLOPE, 0] * (first - start) + method[END_SLOPE, 1] * (second - start)
     course[END, ACCELERATION] = change / h
     for at in (0, 1, END):
-        course[at, SIDE] = ahead
+        course[at, OWN_SIDE] = ahead
         set_place(integers_1(arrays, SWITCH), floats_1(arrays, NUMBER), course[at])
 
 
@@ -301,36 +287,6 @@ def extend_path(arrays):
     axial[DEEPEST] = max(deepest, depth)
     set_history(arrays, END)
     set_path_constants(arrays, END, tip)
-
-
-@inner
-def land(arrays, counted):
-    """Begin a row of steps behind a kink: the rates of another side, and the works where speed or hub's velocity jump."""
-    switches, axial, ledger = integers_1(arrays, SWITCH), floats_1(arrays, AXIAL_STATE), floats_1(arrays, LEDGER_STATE)
-    lateral, known, sums = floats_3(arrays, LATERAL)[0], floats_2(arrays, KNOWN), floats_2(arrays, INSTANT_SUMS)
-    clamp, speed = floats_3(arrays, CLAMP)[START], floats_2(arrays, COURSES)[START, SPEED]
-    momentum0, momentum1, pace = lateral[1, 0], lateral[1, 1], axial[PACE]
-    for i in range(known.shape[1]):
-        known[START, i] = lateral[0, i]
-    for guide in range(switches[GUIDES]):
-        floats_2(arrays, FORCES)[START, guide] = floats_1(arrays, HELD)[guide]
-    set_velocities(arrays, START)
-    if switches[CUTS]:
-        set_history(arrays, START)
-        set_path_constants(arrays, START, tip_of(arrays, START))
-    set_sums(arrays, START, known.shape[1] > 0)
-    axial[PACE] = speed
-    if counted:
-        axial[NODE_PACE_1], axial[NODE_PACE_2] = speed, speed
-        if switches[INERTIA]:
-            ledger[BOUNDARY] += 0.5 * (pace + speed) * (sums[START, S_MOMENTUM] - axial[LAST_AXIAL_MOMENTUM])
-            rate, turn = 0.5 * (axial[LAST_HUB_RATE] + clamp[1, 0]), 0.5 * (axial[LAST_ANGLE_RATE] + clamp[1, 1])
-            ledger[HUB_WORK] += rate * (lateral[1, 0] - momentum0) + turn * (lateral[1, 1] - momentum1)
-    axial[LAST_POWER] = sums[START, S_POWER]
-    axial[LAST_PRODUCT] = load_product(arrays, START)
-    axial[LAST_AXIAL_MOMENTUM] = sums[START, S_MOMENTUM]
-    axial[LAST_AXIAL_PRODUCT] = speed * sums[START, S_MOMENTUM]
-    axial[LAST_HUB_PRODUCT] = clamp[1, 0] * lateral[1, 0] + clamp[1, 1] * lateral[1, 1]
 
 
 @inner

@@ -94,7 +94,7 @@ def _space(model: Model, width: int) -> dict[int, NDArray[Any]]:
     swept = blocks if model.switches[at.STRIDE] else 0
     dense = 0 if model.switches[at.STRIDE] else width * n
     shapes: dict[int, tuple[int, ...]] = {
-        at.FRESH: (max(pieces, blocks), 3), at.SHAPE: (3, m), at.SIDES: (2, n), at.ANSWER: (width * n,),
+        at.FRESH: (pieces, 3), at.SHAPE: (3, m), at.SIDES: (2, n), at.ANSWER: (width * n,),
         at.COLUMNS: (unknowns, width * n), at.ANSWERS: (unknowns, width * n), at.DENSE: (unknowns, unknowns),
         at.SCRATCH: (unknowns, unknowns), at.GAPS: (unknowns,), at.GUIDE_FORCES: (3, unknowns), at.CUT_COLUMNS: (2, 2 * n),
         at.CUT_LOAD: (2, n), at.CUT_LOAD_RATE: (2, n), at.CUBIC: (4,), at.OTHER_CUBIC: (4,), at.CUT_PAIR: (2, 2),
@@ -105,6 +105,6 @@ def _space(model: Model, width: int) -> dict[int, NDArray[Any]]:
     }  # fmt: skip
     found: dict[int, NDArray[Any]] = {name: np.zeros(shape) for name, shape in shapes.items()}
     found[at.KEY] = np.full(7, np.nan)
-    for name, size in ((at.CHANGED, max(pieces, blocks)), (at.OTHER_CHANGED, max(pieces, blocks)), (at.CHOSEN, guides)):
+    for name, size in ((at.CHANGED, blocks), (at.OTHER_CHANGED, blocks), (at.CHOSEN, guides)):
         found[name] = np.zeros(size, dtype=np.int64)
     return found

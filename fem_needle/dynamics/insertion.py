@@ -1,0 +1,167 @@
+"""A needle under way: the kernel with its state, from breakpoint to breakpoint; the loop that all runs go through.
+
+Enters: a plant and an analysis. Leaves: samples as arrays, states. Open `loop.py` for the steps, `rest_loop.py` for equilibria.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.beam_needle import BeamNeedle
+from fem_needle.collocation import Collocation, gauss
+from fem_needle.dynamics import names as at
+from fem_needle.dynamics.drive import Drive, drive_of
+from fem_needle.dynamics.loop import run_steps
+from fem_needle.dynamics.model import model_of
+from fem_needle.dynamics.rest_loop import run_rests
+from fem_needle.dynamics.state import LiveState, State
+from fem_needle.dynamics.work import Work
+from fem_needle.errors import ComputationError
+from fem_needle.ledger import StepEnd
+from fem_needle.sample_arrays import Samples
+
+Array = NDArray[np.float64]
+
+DYNAMIC, CREEP, REST = "dynamic", "creep", "rest"  # with inertia; without; through equilibria
+NUMBERS_OF_A_CALL = 400_000  # coordinates times steps: a fraction of a second, in which an interrupt waits
+
+_COLUMNS = {
+    "time": at.R_TIME, "depth": at.R_DEPTH, "speed": at.R_SPEED, "push_force": at.R_PUSH, "friction_force": at.R_FRICTION,
+    "tissue_force": at.R_TISSUE, "hub_force": at.R_HUB, "hub_moment": at.R_MOMENT, "kinetic_energy": at.R_KINETIC,
+    "bending_energy": at.R_BENDING, "tissue_energy": at.R_ELASTIC, "guide_energy": at.R_GUIDE,
+    "axial_kinetic_energy": at.R_INSERTION, "load_work": at.R_WORKS + at.LOAD_WORK, "hub_work": at.R_WORKS + at.HUB_WORK,
+    "tissue_work": at.R_WORKS + at.TISSUE_WORK, "tissue_dissipation": at.R_WORKS + at.DISSIPATION,
+    "boundary_energy": at.R_WORKS + at.BOUNDARY, "friction_dissipation": at.R_WORKS + at.FRICTION_LOSS,
+    "cutting_work": at.R_WORKS + at.CUTTING_WORK, "push_work": at.R_WORKS + at.PUSH_WORK,
+    "arrest_loss": at.R_WORKS + at.ARREST_LOSS,
+}  # fmt: skip
+
+
+class Insertion:
+    """A needle and everything that it remembers.
+
+    Parameters
+    ----------
+    plant
+        A needle on shapes.
+    kind
+        "dynamic", "creep" (without inertia) or "rest" (through equilibria).
+    method
+        Collocation method of the steps; of equilibria the nodes of the works between.
+
+    Attributes
+    ----------
+    live
+        The state.
+    """
+
+    def __init__(self, plant: BeamNeedle, kind: str, method: Collocation | None = None) -> None:
+        self.plant, self.kind = plant, kind
+        self.method = gauss(3) if kind == REST or method is None else method
+        self.model = model_of(plant, inertia=kind == DYNAMIC, viscous=kind != REST)
+        if kind == REST:
+            self.model.switches[at.CUTS] = 0
+        self._work = Work(self.model, self.method, 1 if kind == REST else 2)
+        self._work.drive(drive_of(plant.scene))
+        orders = self.model.arrays[at.COEFFICIENTS].shape[2]
+        self.live = LiveState(self._work, self.model.size, self.model.points, orders)
+        self.cuts = bool(self.model.switches[at.CUTS])
+        self._run = run_rests if kind == REST else run_steps
+
+    def begin(self, start: StepEnd, depth: float) -> None:
+        """Stand at t = 0 at a depth [m] with a state."""
+        live, solution = self.live, start.solution
+        live.lateral[0, 0], live.lateral[0, 1] = solution.coordinates, solution.momentum
+        live.held[:] = solution.forces
+        live.axial[at.WAY] = live.axial[at.DEEPEST] = live.path[0][0] = depth
+        live.axial[at.LANDED] = at.KINK
+        if start.path is not None:
+            live.axial[at.FRONT] = start.path.front
+
+    def drive(self, drive: Drive) -> None:
+        """Let other signals act from now on."""
+        self._work.drive(drive)
+
+    def land(self) -> None:
+        """Take what follows as the other side of a kink."""
+        self.live.axial[at.LANDED] = at.KINK
+
+    @property
+    def limits(self) -> Array:
+        """What limits a push (`names`)."""
+        limits: Array = self._work[at.LIMITS]
+        return limits
+
+    def advance(self, intervals: Array, *, counted: bool, from_start: bool = False) -> tuple[int, Samples]:
+        """Go through smooth intervals: start and end [s], steps, whether the end is an output (I, 4).
+
+        Returns how it ended (`names`) and the samples of the outputs; ``from_start``: also one of the first instant.
+        ``counted``: what a kink at the start does enters the works.
+        """
+        work, cursor = self._work, self._work[at.CURSOR]
+        rows = int(np.count_nonzero(intervals[:, 3])) + from_start
+        record = np.zeros((rows, at.RECORD + self.model.size + self.model.points + int(self.model.switches[at.GUIDES])))
+        if self.cuts:
+            self.live.reserve(int(np.sum(intervals[:, 2])))
+        work.put(at.INTERVALS, intervals)
+        work.put(at.RECORDS, record)
+        cursor[:] = 0, 0, 0, int(from_start)
+        self.limits[at.COUNTED] = float(counted)
+        status = int(self._run(work.table))
+        return status, self._samples(record[: cursor[2]])
+
+    def _samples(self, record: Array) -> Samples:
+        n, p = self.model.size, self.model.points
+        parts = np.split(record[:, at.RECORD :], [n, n + p], axis=1)
+        position, deflection = self.live.path_points()
+        pieces = record[:, at.R_PIECES].astype(np.int64)
+        values: dict[str, Any] = {name: np.ascontiguousarray(record[:, column]) for name, column in _COLUMNS.items()}
+        return Samples(
+            **values,
+            coordinates=np.ascontiguousarray(parts[0]),
+            point_forces=np.ascontiguousarray(parts[1]),
+            guide_force=np.ascontiguousarray(parts[2]),
+            path_position=position,
+            path_deflection=deflection,
+            path_points=np.where(pieces > 0, pieces + 2, 0),
+        )
+
+    def state(self) -> State:
+        """Return a copy of the state."""
+        return self.live.copied()
+
+    def restore(self, state: State) -> None:
+        """Go back to a state."""
+        self.live.restore(state)
+
+
+def failed_step(time: float, depth: float, what: str) -> ComputationError:
+    """Return the error of a step from a time [s] and depth [m] that failed."""
+    return ComputationError(
+        f"the step at time {time:g} s, depth {depth:g} m failed: {what}; use a smaller time_step, or fewer elements"
+    )
+
+
+def smooth_stretches(
+    intervals: Iterator[tuple[float, float, int]], outputs: set[float], landings: set[float], size: int
+) -> Generator[tuple[bool, Array], None, None]:
+    """Yield whether a stretch begins at a kink, and its intervals: cut at kinks, and after so many steps."""
+    most, found, steps, at_kink = max(1, NUMBERS_OF_A_CALL // size), list[tuple[float, float, float, float]](), 0, True
+    for start, end, count in intervals:
+        if found and (start in landings or steps + count > most):
+            yield at_kink, np.array(found)
+            found, steps, at_kink = [], 0, start in landings
+        done = 0
+        while count - done > most:  # an interval of its own, in parts
+            middle = start + (end - start) * ((done + most) / count)
+            yield at_kink, np.array([(start + (end - start) * (done / count), middle, most, 0.0)])
+            done, at_kink = done + most, False
+        first = start + (end - start) * (done / count) if done else start
+        found.append((first, end, count - done, float(end in outputs)))
+        steps += count - done
+    if found:
+        yield at_kink, np.array(found)
