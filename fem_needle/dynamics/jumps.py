@@ -24,6 +24,8 @@ from fem_needle.dynamics.lateral import solve_nodes
 from fem_needle.dynamics.names import (
     ACCELERATION,
     ANSWERS,
+    ARREST_LOSS,
+    ARRESTED,
     AXIAL_STATE,
     BEAM,
     BENDING_STIFFNESS,
@@ -51,6 +53,7 @@ from fem_needle.dynamics.names import (
     HUB_WORK,
     INERTIA,
     INSTANT_SUMS,
+    IS_PUSHED,
     KEPT_HELD,
     KEPT_LATERAL,
     KINK,
@@ -61,14 +64,17 @@ from fem_needle.dynamics.names import (
     LAST_AXIAL_PRODUCT,
     LAST_HUB_PRODUCT,
     LAST_HUB_RATE,
+    LAST_PACE,
     LAST_POWER,
     LAST_PRODUCT,
     LATERAL,
     LEDGER_STATE,
+    LENGTH,
     LIMITS,
     LOAD_WORK,
     MASS,
     MASS_FACTOR,
+    MASS_PER_LENGTH,
     METHOD,
     NODE_PACE_1,
     NODE_PACE_2,
@@ -84,16 +90,17 @@ from fem_needle.dynamics.names import (
     PRESCRIBED,
     RATES,
     ROUNDINGS,
+    S_MOMENTUM,
+    S_POWER,
     SIDES,
     SMALLEST_DEPTH,
     SOFTEST,
     SPEED,
     START,
+    STEPS,
     STRETCH,
     STRIDE,
     SWITCH,
-    S_MOMENTUM,
-    S_POWER,
     TIME,
     TISSUE,
     TISSUE_BLOCKS,
@@ -352,10 +359,11 @@ def land(arrays, h):
     """Begin a call or a row of steps: the instant at its start, what a kink does to the state, and its works."""
     switches, axial, limits = integers_1(arrays, SWITCH), floats_1(arrays, AXIAL_STATE), floats_1(arrays, LIMITS)
     lateral, known, clamp = floats_3(arrays, LATERAL)[0], floats_2(arrays, KNOWN), floats_3(arrays, CLAMP)[START]
-    course, pace = floats_2(arrays, COURSES)[START], axial[PACE]
+    course, pace = floats_2(arrays, COURSES)[START], axial[LAST_PACE]
     is_kink, counted = axial[LANDED] == KINK, limits[COUNTED] != 0.0 and axial[LANDED] == KINK
     jumped, changed = clamp_jumps(arrays) and is_kink, loads_jump(arrays)
-    strikes = is_kink and switches[INERTIA] != 0 and has_rigid_guides(arrays)
+    is_held = limits[IS_PUSHED] != 0.0
+    strikes = (is_kink or is_held) and switches[INERTIA] != 0 and has_rigid_guides(arrays)
     for i in range(known.shape[1]):
         known[START, i] = lateral[0, i]
     if switches[INERTIA] and (jumped or strikes):
@@ -388,8 +396,17 @@ def land(arrays, h):
     axial[PACE] = course[SPEED]
     if is_kink:
         axial[NODE_PACE_1], axial[NODE_PACE_2] = course[SPEED], course[SPEED]
-    if counted and switches[INERTIA]:
+    if (counted or (strikes and axial[STEPS] > 0.0)) and switches[INERTIA]:
+        before = floats_1(arrays, LEDGER_STATE)[BOUNDARY]
         momentum_jump_works(arrays, pace, jumped)
+        gained = floats_1(arrays, LEDGER_STATE)[BOUNDARY] - before
+        if axial[ARRESTED] != 0.0:  # what the lateral motion does not take of the needle's own energy is lost
+            mass = floats_1(arrays, NUMBER)[MASS_PER_LENGTH] * floats_1(arrays, NUMBER)[LENGTH]
+            floats_1(arrays, LEDGER_STATE)[ARREST_LOSS] += 0.5 * mass * pace * pace - gained
+    elif axial[ARRESTED] != 0.0:
+        mass = floats_1(arrays, NUMBER)[MASS_PER_LENGTH] * floats_1(arrays, NUMBER)[LENGTH]
+        floats_1(arrays, LEDGER_STATE)[ARREST_LOSS] += 0.5 * mass * pace * pace
+    axial[ARRESTED], axial[LAST_PACE] = 0.0, course[SPEED]
     for point in range(len(floats_1(arrays, HELD))):
         floats_1(arrays, HELD)[point] = floats_2(arrays, FORCES)[START, point]
     sums = floats_2(arrays, INSTANT_SUMS)[START]

@@ -11,7 +11,7 @@ from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, integers_1
 from fem_needle.dynamics.axial import cutting_work
 from fem_needle.dynamics.compilation import entrance, inner, stage
 from fem_needle.dynamics.instant import prepare_matrices, prepare_points, set_loads, set_motion, set_place
-from fem_needle.dynamics.jumps import land
+from fem_needle.dynamics.jumps import has_rigid_guides, land
 from fem_needle.dynamics.lateral import solve_nodes
 from fem_needle.dynamics.names import (
     ACCELERATION,
@@ -53,6 +53,8 @@ from fem_needle.dynamics.names import (
     LAST_ANGLE_RATE,
     LAST_HUB_RATE,
     LAST_LENGTH,
+    LAST_PACE,
+    LAST_POWER,
     LATERAL,
     LAYER,
     LEDGER_STATE,
@@ -76,14 +78,17 @@ from fem_needle.dynamics.names import (
     PLACES,
     PUSH_SIGNAL,
     PUSH_WORK,
-    RECORDS,
-    ROUNDS,
     R_FRICTION,
     R_PUSH,
-    SIGNALS,
+    RECORDS,
+    ROUNDS,
+    S_MOMENTUM,
+    S_POWER,
     SIGNAL_ENDS,
+    SIGNALS,
     SPEED,
     START,
+    START_SLOPE,
     STEPS,
     SWITCH,
     TIME,
@@ -129,12 +134,13 @@ def keep_state(arrays, is_kept):
     copy_row(held if is_kept else floats_1(arrays, KEPT_HELD), floats_1(arrays, KEPT_HELD) if is_kept else held)
 
 
-@stage
+@inner
 def begin_step(arrays, t, h):
     """Set the instant at the start of a step: that of the last step's end, or, where there was none in this call, anew."""
     axial, limits, course = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LIMITS), floats_2(arrays, COURSES)
     clamp, momenta, lateral = floats_3(arrays, CLAMP), floats_2(arrays, MOMENTA), floats_3(arrays, LATERAL)[0]
-    if axial[LANDED] == 0.0:
+    is_held = limits[IS_PUSHED] != 0.0 and has_rigid_guides(arrays)  # which strike a needle that they do not follow
+    if axial[LANDED] == 0.0 and not is_held:
         copy_row(course[END], course[START])
         for row in range(3):
             copy_row(clamp[END, row], clamp[START, row])
@@ -207,6 +213,16 @@ def solve_stages(arrays, t, h, until):
     return DIVERGED
 
 
+@inner
+def accelerate_start(arrays, h):
+    """Let the acceleration at the start of a pushed step be that of its own polynomial, which its power contains."""
+    course, sums, axial = floats_2(arrays, COURSES), floats_2(arrays, INSTANT_SUMS)[START], floats_1(arrays, AXIAL_STATE)
+    slopes, start = floats_2(arrays, METHOD)[START_SLOPE], course[START, SPEED]
+    found = (slopes[0] * (course[0, SPEED] - start) + slopes[1] * (course[1, SPEED] - start)) / h
+    sums[S_POWER] += (course[START, ACCELERATION] - found) * sums[S_MOMENTUM]
+    course[START, ACCELERATION], axial[LAST_POWER] = found, sums[S_POWER]
+
+
 @stage
 def end_step(arrays, t, h, until, is_output):
     """Set the state at the end of a step; returns FAILED where it is not finite."""
@@ -240,7 +256,7 @@ def book_step(arrays, h, is_last, is_shown):
     for at in (0, 1, END, START):
         moves = moves or course[at, SPEED] != 0.0 or course[at, ACCELERATION] != 0.0
     starts = axial[LANDED] == KINK or abs(axial[LAST_LENGTH] - h) > 1e-9 * h
-    corrects = switches[INERTIA] != 0 and moves and (is_last or starts)
+    corrects = switches[INERTIA] != 0 and moves and (is_last or starts or is_pushed)  # any step of a push may turn out to be the last
     if not is_pushed and (corrects or is_shown or not switches[INERTIA]):
         for s in range(2):
             set_sums(arrays, s, corrects)
@@ -267,7 +283,7 @@ def arrive(arrays, h, until):
     """Let the state stand at the end of a step."""
     axial, course, clamp = floats_1(arrays, AXIAL_STATE), floats_2(arrays, COURSES), floats_3(arrays, CLAMP)
     axial[NOW], axial[WAY], axial[PACE] = until, course[END, OWN_DEPTH], course[END, SPEED]
-    axial[NODE_PACE_1], axial[NODE_PACE_2] = course[0, SPEED], course[1, SPEED]
+    axial[NODE_PACE_1], axial[NODE_PACE_2], axial[LAST_PACE] = course[0, SPEED], course[1, SPEED], course[END, SPEED]
     axial[LAST_HUB_RATE], axial[LAST_ANGLE_RATE] = clamp[END, 1, 0], clamp[END, 1, 1]
     axial[LAST_LENGTH], axial[LANDED], axial[STEPS] = h, 0.0, axial[STEPS] + 1.0
 
@@ -307,6 +323,8 @@ def take_step(arrays, t, h, until, is_last, is_output):
     keep_state(arrays, h > 0.0)
     begin_step(arrays, t, h)
     status = solve_stages(arrays, t, h, until)
+    if status == DONE and floats_1(arrays, LIMITS)[IS_PUSHED] != 0.0:
+        accelerate_start(arrays, h)
     if status == DONE:
         status = end_step(arrays, t, h, until, is_output)
     if status == DONE:
@@ -344,6 +362,9 @@ def run_steps(arrays):
     intervals, cursor, axial = floats_2(arrays, INTERVALS), integers_1(arrays, CURSOR), floats_1(arrays, AXIAL_STATE)
     if axial[LANDED] == 0.0:
         axial[LANDED] = CONTINUED  # what the last call left to work on may be another state's
+    if intervals.shape[0] == 0:  # pass the kink, no more
+        keep_state(arrays, True)
+        begin_step(arrays, axial[NOW], max(axial[LAST_LENGTH], np.finfo(np.float64).tiny))
     while cursor[0] < intervals.shape[0]:
         interval = intervals[cursor[0]]
         steps = int(interval[2])

@@ -85,8 +85,11 @@ COURSE = 10
     LAST_HUB_RATE,
     LAST_ANGLE_RATE,
     ROUNDS,
-) = range(20)
-AXIAL = 20
+    LAST_PACE,
+    PIERCED,
+    ARRESTED,
+) = range(23)
+AXIAL = 23
 
 # ledger: works since the start [J].
 (

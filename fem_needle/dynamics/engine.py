@@ -41,7 +41,7 @@ _COLUMNS = {
 }  # fmt: skip
 
 
-class Insertion:
+class Engine:
     """A needle and everything that it remembers.
 
     Parameters
@@ -129,6 +129,26 @@ class Insertion:
             path_deflection=deflection,
             path_points=np.where(pieces > 0, pieces + 2, 0),
         )
+
+    @property
+    def cursor(self) -> NDArray[np.int64]:
+        """Where the last call stopped: interval, step in it."""
+        cursor: NDArray[np.int64] = self._work[at.CURSOR]
+        return cursor
+
+    @property
+    def axial_force_at_start(self) -> float:
+        """A [N] in the first row of the last record."""
+        return float(self._work[at.RECORDS][0, at.R_AXIAL])
+
+    def pass_kink(self, *, counted: bool) -> None:
+        """Let the kink that is ahead act now."""
+        self.advance(np.zeros((0, 4)), counted=counted)
+
+    def axial_of(self, state: State) -> Array:
+        """Return the part of a state that is no coordinate (`names`)."""
+        first = self.live.lateral.size
+        return state.values[first : first + at.AXIAL]
 
     def state(self) -> State:
         """Return a copy of the state."""
