@@ -1,18 +1,36 @@
-"""How the kernel's functions are compiled: small ones into their callers, two entrances kept on disk."""
+"""How the kernel's functions are compiled: small ones into their callers, each entrance as a whole, which is kept on disk.
+
+An entrance takes one table of arrays (`fem_needle.dynamics.arrays`) and is compiled before its first call, once on a machine.
+"""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from time import perf_counter
 from typing import Any
 
+import numpy as np
 from numba import njit
-from numba.core import config, types
+from numba.core import config, event, types
+from numba.core.errors import NumbaError
+from numpy.typing import NDArray
+
+from fem_needle.dynamics import notice
+from fem_needle.dynamics.haste import hastened
+from fem_needle.dynamics.linking import EntranceCompiler, InnerCompiler
 
 # Sums may be reordered; NaN and infinity keep their meaning, by which a failed step is found.
 _ARITHMETIC: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}}
 # Without counting references, which costs more than the arithmetic: compiled code allocates nothing.
-_INNER = _ARITHMETIC | {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-_ENTRANCE = _ARITHMETIC | {"_nrt": False, "no_cfunc_wrapper": True, "cache": True, "nogil": True}
+_INNER = _ARITHMETIC | {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": InnerCompiler}
+_ENTRANCE = _ARITHMETIC | {"_nrt": False, "no_cfunc_wrapper": True, "nogil": True, "pipeline_class": EntranceCompiler}
+
+_TABLE = types.Array(types.int64, 2, "C")
+_FUNCTIONS_SHARE = 0.75  # of the time goes into the functions, what is left into the whole that they become
+_SECONDS_PER_FUNCTION = 0.12
 
 
 def inner(function: Callable[..., Any]) -> Any:
@@ -24,11 +42,113 @@ def inner(function: Callable[..., Any]) -> Any:
     return compiled
 
 
-def stage(function: Callable[..., Any]) -> Any:
-    """Write a function that has one caller into it before it is compiled: what is called deeply is optimized again at each level."""
-    return njit(**_INNER, inline="always")(function)
+stage = inner
 
 
-def entrance(function: Callable[..., Any]) -> Any:
-    """Compile a function that Python calls, keep it on disk, and let other threads go on meanwhile."""
-    return njit(**_ENTRANCE)(function)
+def entrance(what: str, functions: int) -> Callable[[Callable[..., Any]], Entrance]:
+    """Let a function be an entrance.
+
+    Parameters
+    ----------
+    what
+        Its name in messages.
+    functions
+        How many functions are compiled for it, about: so that somebody who waits sees how long.
+    """
+    return lambda function: Entrance(function, what, functions)
+
+
+class Entrance:
+    """A compiled function that Python calls with a table; other threads go on meanwhile.
+
+    Attributes
+    ----------
+    what, functions
+        As `entrance` takes them.
+    compiled
+        How many functions have been compiled for it in this process, 0 where it was on disk.
+    """
+
+    def __init__(self, function: Callable[..., Any], what: str, functions: int) -> None:
+        self.what, self.functions, self.compiled = what, functions, 0
+        self.__name__, self.__doc__, self.__module__ = function.__name__, function.__doc__, function.__module__
+        self._function = function
+        self._is_ready = bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
+        self._run: Any = function if self._is_ready else _kept(function)
+
+    def __call__(self, table: NDArray[np.int64]) -> int:
+        """Run it."""
+        if not self._is_ready:
+            self.prepare()
+        return int(self._run(table))
+
+    @property
+    def folder(self) -> Path | None:
+        """Where it is kept, None where that can be nowhere."""
+        path = None if self._run is self._function else self._run.stats.cache_path
+        return None if path is None else Path(path)
+
+    def prepare(self) -> float:
+        """Load or compile it where that has not been done yet; returns the seconds that took."""
+        began = perf_counter()
+        with hastened():
+            if not self._is_ready:
+                with event.install_listener("numba:compile", _Counter(self)):
+                    self._compile()
+                self._run.disable_compile()
+                self._is_ready = True
+        return perf_counter() - began
+
+    def _compile(self) -> None:
+        try:
+            self._run.compile((_TABLE,))
+        except NumbaError:
+            raise
+        except Exception as error:  # what is on disk may be anything
+            if self.folder is None:
+                raise
+            if not self._run.signatures:
+                self._run = njit(**_ENTRANCE)(self._function)
+                self._run.compile((_TABLE,))
+            notice.LOGGER.warning("the %s cannot be kept in %s: %s", self.what, self.folder, error)
+
+
+class _Counter(event.Listener):
+    """Tells how much of an entrance is compiled."""
+
+    def __init__(self, entrance: Entrance) -> None:
+        self._entrance = entrance
+        self._depth = 0
+
+    def on_start(self, event: event.Event) -> None:
+        if self._depth == 0:
+            notice.begun(
+                self._entrance.what, round(_SECONDS_PER_FUNCTION * self._entrance.functions), is_kept=self._entrance.folder is not None
+            )
+        self._depth += 1
+
+    def on_end(self, event: event.Event) -> None:
+        self._depth -= 1
+        self._entrance.compiled += 1
+        share = min(1.0, self._entrance.compiled / self._entrance.functions)
+        notice.done(self._entrance.what, _FUNCTIONS_SHARE * share if self._depth else 1.0)
+
+
+def _kept(function: Callable[..., Any]) -> Any:
+    """Return a function that is kept on disk, by a name that is another where any file of its package is another."""
+    name = function.__qualname__
+    function.__qualname__ = f"{name}_{_stamp(function.__module__.rpartition('.')[0])}"
+    try:
+        return njit(**_ENTRANCE, cache=True)(function)
+    except RuntimeError:  # no folder can be written
+        return njit(**_ENTRANCE)(function)
+    finally:
+        function.__qualname__ = name
+
+
+def _stamp(package: str) -> str:
+    """Return a text that differs for other sources and for code that checks its indices: numba looks at one file alone."""
+    digest = hashlib.sha256(repr(config.BOUNDSCHECK).encode())  # type: ignore[attr-defined]
+    for path in sorted((path for path in files(package).iterdir() if path.name.endswith(".py")), key=lambda path: path.name):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()[:12]

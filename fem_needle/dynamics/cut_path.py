@@ -9,9 +9,15 @@ pieces together are kept (a binary tree), so that a path of n pieces costs log n
 from __future__ import annotations
 
 from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, integers_1
+from fem_needle.dynamics.callback import ask
 from fem_needle.dynamics.compilation import inner
-from fem_needle.dynamics.cover import locate, shapes_at, tip_place
+from fem_needle.dynamics.cover import locate
 from fem_needle.dynamics.names import (
+    ANSWERED,
+    ANSWERED_LOAD,
+    ASK_FRESH,
+    ASK_HISTORY,
+    ASKED,
     AXIAL_STATE,
     COEFFICIENTS,
     COURSES,
@@ -19,6 +25,7 @@ from fem_needle.dynamics.names import (
     DEEPEST,
     DEPTH,
     FRAME,
+    GIVEN,
     LAYER,
     LAYER_END,
     LAYER_START,
@@ -209,13 +216,25 @@ def add_rest(arrays, is_history, start, stop, cubic, course, load, load_rate):
 
 
 @inner
+def add_answer(arrays, load, load_rate):
+    """Add what a model that was asked has answered to H and dH/dz."""
+    answer = floats_2(arrays, ANSWERED_LOAD)
+    for i in range(len(load)):
+        load[i] += answer[0, i]
+        load_rate[i] += answer[1, i]
+
+
+@inner
 def set_history(arrays, at):
     """Set H and dH/dz of the path behind a step at an instant."""
     edges, cubics, count = floats_1(arrays, PATH_EDGES), floats_2(arrays, PATH_CUBICS), integers_1(arrays, PATH_COUNT)[0]
     load, load_rate = floats_2(arrays, PATH_LOAD)[at], floats_2(arrays, PATH_LOAD_RATE)[at]
     load[:] = 0.0
     load_rate[:] = 0.0
-    if count > 0:
+    if count > 0 and integers_1(arrays, SWITCH)[GIVEN]:
+        ask(integers_1(arrays, ASKED)[0], at, ASK_HISTORY)
+        add_answer(arrays, load, load_rate)
+    elif count > 0:
         add_rest(arrays, count > 0, edges[0], edges[count], cubics[0], floats_2(arrays, COURSES)[at], load, load_rate)
 
 
@@ -223,7 +242,12 @@ def set_history(arrays, at):
 def add_fresh(arrays, at, cubic, load, load_rate):
     """Add what a cubic about the deepest point, the piece that is being cut, adds to H and dH/dz."""
     course, deepest = floats_2(arrays, COURSES)[at], floats_1(arrays, AXIAL_STATE)[DEEPEST]
-    if course[OWN_DEPTH] > deepest:
+    if course[OWN_DEPTH] > deepest and integers_1(arrays, SWITCH)[GIVEN]:
+        for i in range(4):
+            floats_1(arrays, ANSWERED)[i] = cubic[i]
+        ask(integers_1(arrays, ASKED)[0], at, ASK_FRESH)
+        add_answer(arrays, load, load_rate)
+    elif course[OWN_DEPTH] > deepest:
         add_rest(arrays, course[OWN_DEPTH] < deepest, deepest, course[DEPTH], cubic, course, load, load_rate)
 
 
@@ -262,17 +286,15 @@ def rest_constant(course, count, edges, cubics, squares, layers):
 
 
 @inner
-def add_tip_rest(rest, course, nodes, coef, switches, numbers, layers, shape, load_rate):
-    """Add k r psi at the tip to dH/dz; returns dc/dz = 1/2 k r^2 there."""
-    tip = tip_place(course[DEPTH], switches[FRAME], numbers[LENGTH])
-    piece, total = locate(nodes, tip), 0.0
-    shapes_at(coef, nodes, piece, tip, shape)
+def add_tip_rest(rest, course, layers, row, first, load_rate):
+    """Add k r psi at the tip, whose row of the shapes is given, to dH/dz; returns dc/dz = 1/2 k r^2 there."""
+    total = 0.0
     for number in range(layers.shape[0]):
         layer = layers[number]
         if course[SIDE] > layer[LAYER_START] and course[SIDE] <= layer[LAYER_END]:
             total += 0.5 * layer[MODULUS] * rest * rest
-            for i in range(coef.shape[1]):
-                load_rate[switches[STRIDE] * piece + i] += layer[MODULUS] * rest * shape[0, i]
+            for i in range(len(row)):
+                load_rate[first + i] += layer[MODULUS] * rest * row[i]
     return total
 
 

@@ -6,10 +6,14 @@ A = dL/dz - d/dt (dT/dv) + drag,   L = T - U,   dT/dv = q'.S q + v q.R q        
 from __future__ import annotations
 
 from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, floats_5, integers_1, integers_2
+from fem_needle.dynamics.callback import ask
 from fem_needle.dynamics.compilation import inner
 from fem_needle.dynamics.cover import locate, place_of, place_rate, shapes_at
 from fem_needle.dynamics.instant import beam_at
 from fem_needle.dynamics.names import (
+    ANSWERED,
+    ASK_ENERGY_FORCE,
+    ASKED,
     BEAM,
     BENDING_STIFFNESS,
     CENTRIFUGAL,
@@ -29,6 +33,7 @@ from fem_needle.dynamics.names import (
     FLEXIBLE_RATE,
     FORCES,
     FRAME,
+    GIVEN,
     INERTIA,
     KNOWN,
     LAYER,
@@ -98,11 +103,23 @@ def moving_ends(course, nodes, coef, switches, numbers, layers, shape, q):
 
 
 @inner
+def path_force(arrays, at):
+    """Return m (q.dH/dz - dc/dz), what a cut path adds to d(T - U)/dz."""
+    if not integers_1(arrays, SWITCH)[CUTS]:
+        return 0.0
+    moved = along(floats_2(arrays, PATH_LOAD_RATE)[at], 0, floats_2(arrays, KNOWN)[at])
+    return floats_2(arrays, COURSES)[at, FACTOR] * (moved - floats_2(arrays, PATH_CONSTANTS)[at, 1])
+
+
+@inner
 def energy_force(arrays, at):
     """Return d(T - U)/dz of an instant at fixed coordinates, velocities and speed."""
     switches, numbers, course = integers_1(arrays, SWITCH), floats_1(arrays, NUMBER), floats_2(arrays, COURSES)[at]
     nodes, coef, shape = floats_1(arrays, PIECE_NODES), floats_3(arrays, COEFFICIENTS), floats_2(arrays, SHAPE)
     q, rate, beams = floats_2(arrays, KNOWN)[at], floats_2(arrays, RATES)[at], floats_5(arrays, BEAM)
+    if switches[GIVEN]:
+        ask(integers_1(arrays, ASKED)[0], at, ASK_ENERGY_FORCE)
+        return floats_1(arrays, ANSWERED)[0] + path_force(arrays, at)
     frame, stretch, stride, speed = switches[FRAME], course[STRETCH], switches[STRIDE], course[SPEED]
     beam, force = beams[beam_at(beams, at)], 0.0
     rise = course[FACTOR] * moving_ends(course, nodes, coef, switches, numbers, floats_2(arrays, LAYER), shape, q)
@@ -124,9 +141,7 @@ def energy_force(arrays, at):
             if switches[CONVECTED]:
                 velocity += speed * along(shape[1], stride * locate(nodes, course[DEPTH]), q)
             force += 0.5 * numbers[MASS_PER_LENGTH] * velocity * velocity
-    if switches[CUTS]:
-        force += course[FACTOR] * (along(floats_2(arrays, PATH_LOAD_RATE)[at], 0, q) - floats_2(arrays, PATH_CONSTANTS)[at, 1])
-    return force - 0.5 * rise
+    return force - 0.5 * rise + path_force(arrays, at)
 
 
 @inner

@@ -11,17 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.beam_needle import BeamNeedle
 from fem_needle.collocation import Collocation, gauss
 from fem_needle.dynamics import names as at
 from fem_needle.dynamics.drive import Drive, drive_of
+from fem_needle.dynamics.given import Answers, given_model
 from fem_needle.dynamics.loop import run_steps
-from fem_needle.dynamics.model import model_of
+from fem_needle.dynamics.model import is_known, model_of
 from fem_needle.dynamics.rest_loop import run_rests
 from fem_needle.dynamics.state import LiveState, State
 from fem_needle.dynamics.work import Work
 from fem_needle.errors import ComputationError
 from fem_needle.ledger import StepEnd
+from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
 
 Array = NDArray[np.float64]
@@ -59,10 +60,12 @@ class Engine:
         The state.
     """
 
-    def __init__(self, plant: BeamNeedle, kind: str, method: Collocation | None = None) -> None:
+    def __init__(self, plant: Plant, kind: str, method: Collocation | None = None) -> None:
         self.plant, self.kind = plant, kind
         self.method = gauss(3) if kind == REST or method is None else method
-        self.model = model_of(plant, inertia=kind == DYNAMIC, viscous=kind != REST)
+        known = is_known(plant)
+        make = model_of if known else given_model
+        self.model = make(plant, inertia=kind == DYNAMIC, viscous=kind != REST)
         if kind == REST:
             self.model.switches[at.CUTS] = 0
         self._work = Work(self.model, self.method, 1 if kind == REST else 2)
@@ -71,6 +74,7 @@ class Engine:
         self.live = LiveState(self._work, self.model.size, self.model.points, orders)
         self.cuts = bool(self.model.switches[at.CUTS])
         self._run = run_rests if kind == REST else run_steps
+        self._answers = None if known else Answers(plant, self._work)
 
     def begin(self, start: StepEnd, depth: float) -> None:
         """Stand at t = 0 at a depth [m] with a state."""
@@ -112,7 +116,18 @@ class Engine:
         cursor[:] = 0, 0, 0, int(from_start)
         self.limits[at.COUNTED] = float(counted)
         status = int(self._run(work.table))
+        if self._answers is not None:
+            self._answers.callback.check()
+            self._set_clamp_reactions(record[: cursor[2]])
         return status, self._samples(record[: cursor[2]])
+
+    def _set_clamp_reactions(self, record: Array) -> None:
+        """Let a model that is asked say what its clamp takes."""
+        for row in record:
+            if row[at.R_DEPTH] >= self.plant.smallest_depth:
+                residual = np.zeros(self.model.size)
+                residual[:2] = row[at.R_HUB], row[at.R_MOMENT]
+                row[at.R_HUB], row[at.R_MOMENT] = self.plant.clamp_reactions(residual, float(row[at.R_DEPTH]))
 
     def _samples(self, record: Array) -> Samples:
         n, p = self.model.size, self.model.points

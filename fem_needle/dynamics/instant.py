@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, floats_4, floats_5, integers_1, integers_2
+from fem_needle.dynamics.callback import ask
 from fem_needle.dynamics.compilation import inner
-from fem_needle.dynamics.cover import cover_elements, cover_functions, grow, locate, shapes_at
+from fem_needle.dynamics.cover import cover_elements, cover_functions, grow
 from fem_needle.dynamics.names import (
     ACCELERATION,
     ANGLE_SIGNAL,
+    ASK_MATRICES,
+    ASKED,
     BEAM,
-    BENDING,
     BEVEL,
     CLAMP,
     COEFFICIENTS,
@@ -29,13 +31,13 @@ from fem_needle.dynamics.names import (
     FORCES,
     FRAME,
     FRESH,
+    GIVEN,
     GUIDES,
     HUB_SIGNAL,
     LAYER,
     LAYER_END,
     LAYER_START,
     LOAD_SIGNAL,
-    MASS,
     MODULUS,
     NUMBER,
     OWN_DEPTH,
@@ -47,9 +49,6 @@ from fem_needle.dynamics.names import (
     POINT_ROWS,
     POINTS,
     POSITION,
-    PRINTED,
-    PRINTED_ERRORS,
-    PRINTED_STIFFNESS,
     RULE,
     SHAPE,
     SIDE,
@@ -63,7 +62,6 @@ from fem_needle.dynamics.names import (
     SWITCH,
     TIME,
     TIPS,
-    TISSUE,
     TISSUE_BLOCKS,
     UNIT,
     UNIT_SUMS,
@@ -140,29 +138,22 @@ def prepare_matrices(arrays, at, changed):
         units, fresh = floats_4(arrays, UNIT), floats_2(arrays, FRESH)
         cover_elements(course, nodes, coef, quad, units, switches, numbers, layers, tissue, covered, fresh, shape, changed)
         return
+    if switches[GIVEN]:
+        if covered[0, 0] != course[DEPTH] or covered[0, 1] != course[TIME]:
+            covered[0, 0], covered[0, 1], changed[0] = course[DEPTH], course[TIME], 1
+            ask(integers_1(arrays, ASKED)[0], at, ASK_MATRICES)
+        return
     sums = floats_4(arrays, UNIT_SUMS)
     if switches[FRAME] == FIXED and not (covered[0, 0] == course[DEPTH] and covered[0, 1] == course[SIDE]):
         grow(course, nodes, coef, quad, sums, switches, numbers, shape, floats_5(arrays, BEAM)[at, 0])
     cover_functions(course, nodes, coef, quad, sums, switches, numbers, layers, tissue, covered, shape, changed)
-    if switches[PRINTED]:
-        set_mistakes(numbers[PRINTED_STIFFNESS], nodes, coef, course, floats_5(arrays, BEAM)[at, 0], tissue[0], shape, floats_4(arrays, PRINTED_ERRORS)[at])
-
-
-@inner
-def set_mistakes(stiffness, nodes, coef, course, beam, tissue, shape, errors):
-    """Set X and Y (2, 4, 4) of the printed equations of two modes: what their forces are short of or beyond the right ones."""
-    errors[:, :, :] = 0.0
-    shapes_at(coef, nodes, locate(nodes, course[DEPTH]), course[DEPTH], shape)
-    for j in range(2, 4):
-        errors[0, 2, j] = beam[BENDING, 2, 2] + stiffness * shape[0, 2] * shape[0, j]
-        for i in range(2, 4):
-            errors[0, i, j] -= beam[BENDING, i, j] + course[FACTOR] * tissue[TISSUE, i, j]
-        errors[1, 3, j] = -beam[MASS, 3, j]
 
 
 @inner
 def prepare_points(arrays, at):
-    """Set the points of an instant."""
+    """Set the points of an instant; a model that is asked has set them with its matrices."""
+    if integers_1(arrays, SWITCH)[GIVEN]:
+        return
     set_points(
         floats_2(arrays, COURSES)[at], floats_1(arrays, PIECE_NODES), floats_3(arrays, COEFFICIENTS), integers_1(arrays, SWITCH),
         floats_1(arrays, NUMBER), floats_1(arrays, POSITION), floats_2(arrays, SHAPE), floats_3(arrays, POINT_ROWS)[at],

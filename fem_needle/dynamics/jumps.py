@@ -16,7 +16,7 @@ import numpy as np
 from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, floats_5, integers_1, integers_2
 from fem_needle.dynamics.compilation import inner
 from fem_needle.dynamics.cut_path import set_history
-from fem_needle.dynamics.dense import solve_cholesky, solve_small
+from fem_needle.dynamics.dense import solve_small
 from fem_needle.dynamics.energy import bending_energy, kinetic_energy, tissue_energy
 from fem_needle.dynamics.guides import soft_reactions
 from fem_needle.dynamics.instant import beam_at, prepare_matrices, prepare_points
@@ -73,7 +73,6 @@ from fem_needle.dynamics.names import (
     LIMITS,
     LOAD_WORK,
     MASS,
-    MASS_FACTOR,
     MASS_PER_LENGTH,
     METHOD,
     NODE_PACE_1,
@@ -110,6 +109,7 @@ from fem_needle.dynamics.names import (
 )
 from fem_needle.dynamics.points import along, deflection_at
 from fem_needle.dynamics.products import add_covered, add_product, bending_form, covered_form
+from fem_needle.dynamics.reduced import solve_mass
 from fem_needle.dynamics.stepping import finish, set_path_constants, set_velocities, tip_of
 from fem_needle.dynamics.works import load_product, set_sums
 
@@ -152,7 +152,7 @@ def has_rigid_guides(arrays):
 def answers_of_mass(arrays):
     """Set M^-1 N' of the rigid guides at the start in ``ANSWERS``, the guides' numbers in ``CHOSEN``; returns how many they are."""
     rows, first = floats_3(arrays, POINT_ROWS)[START], integers_2(arrays, POINT_FIRST)[START]
-    answers, chosen, clamped = floats_2(arrays, ANSWERS), integers_1(arrays, CHOSEN), integers_1(arrays, SWITCH)[PRESCRIBED]
+    answers, chosen = floats_2(arrays, ANSWERS), integers_1(arrays, CHOSEN)
     compliance, stretch, count = floats_1(arrays, COMPLIANCE), floats_2(arrays, COURSES)[START, STRETCH], 0
     n = floats_2(arrays, KNOWN).shape[1]
     for guide in range(len(compliance)):
@@ -161,7 +161,7 @@ def answers_of_mass(arrays):
             answer[:] = 0.0
             for i in range(rows.shape[1]):
                 answer[first[guide] + i] = rows[guide, i]
-            solve_cholesky(floats_2(arrays, MASS_FACTOR), clamped, answer)
+            solve_mass(arrays, START, answer)
             for i in range(n):
                 answer[i] /= stretch
             chosen[count] = guide
@@ -191,7 +191,7 @@ def carry(arrays):
     for c in range(clamped):
         moved[c] = floats_3(arrays, CLAMP)[START, 0, c] - lateral[0, c]
     add_product(beams[beam_at(beams, START)], MASS, switches[STRIDE], -1.0, moved, pulled)
-    solve_cholesky(floats_2(arrays, MASS_FACTOR), clamped, pulled)
+    solve_mass(arrays, START, pulled)
     for i in range(clamped, len(moved)):
         moved[i] = pulled[i]
     count = answers_of_mass(arrays)

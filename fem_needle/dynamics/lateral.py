@@ -5,7 +5,7 @@ from __future__ import annotations
 from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, floats_4, floats_5, integers_1, integers_2
 from fem_needle.dynamics.compilation import inner
 from fem_needle.dynamics.cut_path import add_fresh, parabola, set_history
-from fem_needle.dynamics.dense import factor_dense, solve_dense, solve_small
+from fem_needle.dynamics.dense import solve_small
 from fem_needle.dynamics.forces import (
     add_bending,
     add_inertial_forces,
@@ -38,7 +38,6 @@ from fem_needle.dynamics.names import (
     DEEPEST,
     DENSE,
     FACTOR,
-    FACTORS,
     FLEXIBLE,
     FORCES,
     FRONT,
@@ -74,6 +73,7 @@ from fem_needle.dynamics.names import (
     TISSUE_BLOCKS,
 )
 from fem_needle.dynamics.points import along
+from fem_needle.dynamics.reduced import factor_functions, solve_functions
 from fem_needle.dynamics.sweep import eliminate_two, solve_two
 from fem_needle.dynamics.system import fill_step, set_gaps
 
@@ -118,7 +118,7 @@ def factor_step(arrays, h):
     else:
         if switches[PRINTED]:
             add_errors(floats_4(arrays, PRINTED_ERRORS), h, inverse, matrices[0])
-        factor_dense(2 * switches[PRESCRIBED], matrices[0], floats_2(arrays, FACTORS))
+        factor_functions(arrays, 2, 0)
     for block in range(last + 1):
         changed[block] = 0
 
@@ -138,7 +138,7 @@ def solve_step(arrays, is_whole, values):
             floats_4(arrays, SHARES), gaps, values,
         )  # fmt: skip
     else:
-        solve_dense(2 * switches[PRESCRIBED], floats_2(arrays, FACTORS), values)
+        solve_functions(arrays, 2, 0, values)
 
 
 @inner

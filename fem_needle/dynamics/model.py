@@ -18,7 +18,7 @@ from fem_needle.dynamics.drive import bevel_of
 from fem_needle.frames import MaterialFrame, StretchedFrame
 from fem_needle.gauss import gauss_rule
 from fem_needle.piecewise import PiecewisePolynomials
-from fem_needle.plant import SMALLEST_COMPLIANCE
+from fem_needle.plant import SMALLEST_COMPLIANCE, Plant
 from fem_needle.scene import Scene, TipLoad
 from fem_needle.shapes import Shapes
 
@@ -51,6 +51,11 @@ class Model:
         return self.arrays[at.SWITCH]
 
 
+def is_known(plant: Plant) -> bool:
+    """Return whether a plant's shapes are polynomials that say all of it: else the kernel asks it for its matrices."""
+    return isinstance(plant, BeamNeedle) and plant.has_table
+
+
 def model_of(plant: BeamNeedle, *, inertia: bool, viscous: bool = True) -> Model:
     """Return the arrays of a needle; without viscosity, or without inertia, where these are left out."""
     scene, polynomials = plant.scene, plant.shapes.polynomials()
@@ -67,13 +72,13 @@ def model_of(plant: BeamNeedle, *, inertia: bool, viscous: bool = True) -> Model
     compliance = [0.0 if guide.stiffness == "rigid" else 1.0 / guide.stiffness for guide in scene.support.guides]
     arrays = {
         at.SWITCH: switches,
-        at.NUMBER: _numbers(plant),
-        at.LAYER: _layers(scene),
+        at.NUMBER: numbers_of(plant),
+        at.LAYER: layer_rows(scene),
         at.POSITION: np.array([point.position for point in points_of(scene)]),
         at.COMPLIANCE: np.array(compliance),
         at.BEVEL: bevel_of(scene),
         at.ONE: np.asarray(plant.deflection_at_one, dtype=float),
-        at.MASS_FACTOR: _mass_factor(constants[0], polynomials.stride, plant.size, plant.prescribed),
+        at.MASS_FACTOR: mass_factor(constants[0], polynomials.stride, plant.size, plant.prescribed),
         at.PASCAL: np.array([[float(comb(k, n)) for n in range(orders)] for k in range(orders)]),
         at.PIECE_NODES: polynomials.nodes,
         at.COEFFICIENTS: polynomials.coefficients,
@@ -105,7 +110,7 @@ def _switches(plant: BeamNeedle, polynomials: PiecewisePolynomials, frame: int) 
     return found
 
 
-def _numbers(plant: BeamNeedle) -> Array:
+def numbers_of(plant: Plant) -> Array:
     scene, found = plant.scene, np.zeros(at.NUMBERS)
     needle, friction = scene.needle, scene.friction
     found[at.LENGTH], found[at.MASS_PER_LENGTH] = needle.length, needle.mass_per_length
@@ -117,7 +122,7 @@ def _numbers(plant: BeamNeedle) -> Array:
     return found
 
 
-def _layers(scene: Scene) -> Array:
+def layer_rows(scene: Scene) -> Array:
     rows = [
         (layer.start, layer.far_side, layer.foundation_modulus, layer.damping, layer.cutting_force) for layer in scene.tissue.layers
     ]
@@ -175,7 +180,7 @@ def _beam_matrices(plant: BeamNeedle, polynomials: PiecewisePolynomials, units: 
     return np.ascontiguousarray(blocks[None])
 
 
-def _mass_factor(blocks: Array, stride: int, size: int, clamped: int) -> Array:
+def mass_factor(blocks: Array, stride: int, size: int, clamped: int) -> Array:
     """Return rows of the lower Cholesky factor of M (n, w + 1), the inverse of its diagonal last; room for one where M changes."""
     m = blocks.shape[2]
     width = m - 1

@@ -222,7 +222,9 @@ LATERAL, AXIAL_STATE, LEDGER_STATE, HELD, PATH_EDGES, PATH_CUBICS, PATH_MOMENTS,
 ) = range(50, 83)
 # A call.
 INTERVALS, CURSOR, LIMITS, RECORDS = range(83, 87)
-ARRAYS = 87
+# A model that is asked: its address, numbers and loads that it answers, directions that it resolves and how many, and work space.
+ASKED, ANSWERED, ANSWERED_LOAD, SUBSPACE, RANKS, REDUCED, REDUCED_VALUES, REDUCED_WORK = range(87, 95)
+ARRAYS = 95
 
 # rows of METHOD.
 PLACES, WEIGHTS, END_SHARES, START_SLOPE, END_SLOPE = range(5)
@@ -233,3 +235,6 @@ LIMITS_SIZE = 9
 
 KINK, CONTINUED = 1.0, 2.0  # of LANDED: what precedes a step; the latter is the start of a call
 ROUNDINGS = 1e-12  # of a depth: what a step may miss the deepest point by
+
+# A model that gives its matrices depth by depth: what is asked of it, and where the answers stand.
+ASK_MATRICES, ASK_ENERGY_FORCE, ASK_HISTORY, ASK_FRESH = range(4)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, floats_4, floats_5, integers_1, integers_2
 from fem_needle.dynamics.axial import cutting_work
 from fem_needle.dynamics.compilation import entrance, inner
-from fem_needle.dynamics.dense import factor_dense, solve_dense
 from fem_needle.dynamics.forces import add_point_forces, add_tissue_forces
 from fem_needle.dynamics.guides import guide_columns, guide_system, hold_guides
 from fem_needle.dynamics.instant import beam_at, prepare_matrices, prepare_points, set_loads, set_motion, set_place
@@ -36,7 +35,6 @@ from fem_needle.dynamics.names import (
     DENSE,
     DONE,
     END,
-    FACTORS,
     FAILED,
     FLEXIBLE,
     FORCES,
@@ -88,6 +86,7 @@ from fem_needle.dynamics.names import (
 )
 from fem_needle.dynamics.points import finite
 from fem_needle.dynamics.record import keep_output
+from fem_needle.dynamics.reduced import factor_functions, solve_functions
 from fem_needle.dynamics.sweep import eliminate_one, solve_one
 from fem_needle.dynamics.system import fill_rest
 from fem_needle.dynamics.works import add_ends, add_node, load_product, set_sums
@@ -124,11 +123,11 @@ def factor_rest(arrays, at):
             floats_3(arrays, NODE_MATRICES), floats_4(arrays, SHARES),
         )  # fmt: skip
     else:
-        factor_dense(switches[PRESCRIBED], matrices[0], floats_2(arrays, FACTORS))
+        factor_functions(arrays, 1, at)
 
 
 @inner
-def answer_at_rest(arrays, values):
+def answer_at_rest(arrays, at, values):
     """Replace a right-hand side (n,) by the deflection beside the straight needle."""
     switches = integers_1(arrays, SWITCH)
     if switches[STRIDE]:
@@ -137,7 +136,7 @@ def answer_at_rest(arrays, values):
             floats_3(arrays, NODE_MATRICES), floats_4(arrays, SHARES), floats_2(arrays, BEAM_GAPS), values,
         )  # fmt: skip
     else:
-        solve_dense(switches[PRESCRIBED], floats_2(arrays, FACTORS), values)
+        solve_functions(arrays, 1, at, values)
 
 
 @inner
@@ -150,7 +149,7 @@ def hold_rest(arrays, at, side):
     for number in range(switches[GUIDES]):
         for i in range(columns.shape[1]):
             answers[number, i] = columns[number, i]
-        answer_at_rest(arrays, answers[number])
+        answer_at_rest(arrays, at, answers[number])
     guide_system(1, switches, rows, first, flexible, floats_1(arrays, COMPLIANCE), answers, floats_2(arrays, DENSE))
     hold_guides(
         1, True, switches, rows, first, flexible, forces, floats_2(arrays, KNOWN)[at : at + 1], answers, floats_2(arrays, DENSE),
@@ -180,7 +179,7 @@ def rest_at(arrays, at, time, middle):
     add_tissue_forces(course, floats_5(arrays, TISSUE_BLOCKS)[at], floats_3(arrays, COVERED)[at], switches, q, q, side)
     add_point_forces(switches[GUIDES], floats_3(arrays, POINT_ROWS)[at], integers_2(arrays, POINT_FIRST)[at], forces, side)
     factor_rest(arrays, at)
-    answer_at_rest(arrays, side)
+    answer_at_rest(arrays, at, side)
     if switches[GUIDES]:
         hold_rest(arrays, at, side)
     for i in range(len(q)):

@@ -18,7 +18,6 @@ from fem_needle.dynamics.cut_path import (
     squared,
     through_four,
 )
-from fem_needle.dynamics.dense import cholesky, solve_cholesky
 from fem_needle.dynamics.energy import axial_momentum
 from fem_needle.dynamics.forces import add_momentum
 from fem_needle.dynamics.guides import soft_reactions
@@ -31,7 +30,6 @@ from fem_needle.dynamics.names import (
     BEAM,
     CHOSEN,
     CLAMP,
-    COEFFICIENTS,
     COMPLIANCE,
     COURSES,
     CUBIC,
@@ -61,8 +59,6 @@ from fem_needle.dynamics.names import (
     LAYER_START,
     LENGTH,
     LIMITS,
-    MASS,
-    MASS_FACTOR,
     MASS_PER_LENGTH,
     MATERIAL,
     METHOD,
@@ -84,7 +80,6 @@ from fem_needle.dynamics.names import (
     PATH_LOAD_RATE,
     PATH_MOMENTS,
     PATH_SQUARES,
-    PIECE_NODES,
     PLACES,
     POINT_FIRST,
     POINT_ROWS,
@@ -94,7 +89,6 @@ from fem_needle.dynamics.names import (
     ROUNDINGS,
     S_CONFIGURATION,
     S_MOMENTUM,
-    SHAPE,
     SIDE,
     SIGNAL_ENDS,
     SIGNALS,
@@ -108,6 +102,7 @@ from fem_needle.dynamics.names import (
     WEIGHTS,
 )
 from fem_needle.dynamics.points import along
+from fem_needle.dynamics.reduced import factor_mass, solve_mass
 from fem_needle.dynamics.signals import row_at, value_of
 
 
@@ -152,7 +147,6 @@ def set_velocities(arrays, at):
     switches, course, beams = integers_1(arrays, SWITCH), floats_2(arrays, COURSES)[at], floats_5(arrays, BEAM)
     known, rates, right = floats_2(arrays, KNOWN)[at], floats_2(arrays, RATES)[at], floats_2(arrays, VECTORS)[0]
     lateral, clamped, beam = floats_3(arrays, LATERAL)[0], switches[PRESCRIBED], beams[beam_at(beams, at)]
-    factor = floats_2(arrays, MASS_FACTOR)
     for i in range(len(known)):
         rates[i], right[i] = 0.0, lateral[1, i]
     if not switches[INERTIA]:
@@ -161,8 +155,8 @@ def set_velocities(arrays, at):
         rates[i] = floats_3(arrays, CLAMP)[at, 1, i]
     add_momentum(-1.0, course, beam, switches, known, rates, right)
     if beams.shape[0] > 1:
-        cholesky(beam[0, MASS], 1.0, clamped, factor)
-    solve_cholesky(factor, clamped, right)
+        factor_mass(arrays, at)
+    solve_mass(arrays, at, right)
     for i in range(clamped, len(known)):
         rates[i] = right[i] / course[STRETCH]
     right[:] = 0.0
@@ -217,10 +211,9 @@ def set_path_constants(arrays, at, tip):
     edges, cubics, count = floats_1(arrays, PATH_EDGES), floats_2(arrays, PATH_CUBICS), integers_1(arrays, PATH_COUNT)[0]
     constants, depth = floats_2(arrays, PATH_CONSTANTS)[at], course[OWN_DEPTH]
     front = tip if depth >= edges[count] else path_value(depth, count, edges, cubics)
-    constants[1] = add_tip_rest(
-        front, course, floats_1(arrays, PIECE_NODES), floats_3(arrays, COEFFICIENTS), integers_1(arrays, SWITCH),
-        floats_1(arrays, NUMBER), layers, floats_2(arrays, SHAPE), floats_2(arrays, PATH_LOAD_RATE)[at],
-    )  # fmt: skip
+    rows, first = floats_3(arrays, POINT_ROWS)[at], integers_2(arrays, POINT_FIRST)[at]
+    last = rows.shape[0] - 1
+    constants[1] = add_tip_rest(front, course, layers, rows[last], first[last], floats_2(arrays, PATH_LOAD_RATE)[at])
     constants[0] = rest_constant(course, count, edges, cubics, floats_1(arrays, PATH_SQUARES), layers)
 
 
