@@ -9,15 +9,15 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.dynamics.push import run_limits
+from fem_needle.dynamics.vibration import needs_no_steps, vibrating_tips
 from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
 from fem_needle.inertia_effect import POINTS_PER_PERIOD, inertia_effect
 from fem_needle.limits import check_samples
 from fem_needle.loads import load_cases
-from fem_needle.modal_stepper import needs_no_steps, vibrating_tips
 from fem_needle.motion import PUSH_SLACK, depth_law, lateral_values, run_duration, shortest_period
 from fem_needle.plant import Plant
-from fem_needle.pushed_march import run_limits
 from fem_needle.scene import Scene, as_function
 from fem_needle.skipping import INERTIA_SHARE, Skipped, unneeded_terms
 from fem_needle.statics import solve_static

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fem_needle.choices import instants, static_tips, tip_difference, tip_differences
+from fem_needle.dynamics.vibration import needs_no_steps
 from fem_needle.errors import SceneError
-from fem_needle.modal_stepper import needs_no_steps
 from fem_needle.models import ChosenPlant
 from fem_needle.needle import FiniteElementNeedle
 from fem_needle.plant import Plant

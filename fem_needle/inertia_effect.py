@@ -19,15 +19,14 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from fem_needle import banded
+from fem_needle.dynamics.grid import TimeGrid
+from fem_needle.dynamics.run import run_samples, without_inertia
 from fem_needle.free_response import ROUNDING, frozen_matrices, ringing
 from fem_needle.limits import check_swings
 from fem_needle.loads import load_case
-from fem_needle.march import TimeGrid, march
 from fem_needle.motion import DepthLaw, depth_law, landing_times, run_duration, shortest_period
 from fem_needle.plant import Operators, Plant
-from fem_needle.sample_arrays import Samples
-from fem_needle.samples import stacked
-from fem_needle.skipping import inertia_free_stepper
+from fem_needle.sample_arrays import Samples, joined
 from fem_needle.statics import depth_derivative, solve_guided, solve_static
 
 Array = NDArray[np.float64]
@@ -97,7 +96,7 @@ def _pilot(plant: Plant) -> list[_Piece]:
         outputs += np.linspace(start, end, max(FEWEST_SAMPLES, int(np.ceil((end - start) / step))) + 1)[1:].tolist()
     if outputs[-1] < duration:
         outputs.append(duration)
-    samples = stacked(list(march(plant, inertia_free_stepper(plant), TimeGrid(tuple(outputs), landings, duration))))
+    samples = joined(list(run_samples(plant, without_inertia(scene), TimeGrid(tuple(outputs), landings, duration))))
     inside = [(samples.time >= start) & (samples.time <= end) for start, end in pairwise(marks)]
     return [_piece(plant, law, samples.rows(mask)) for mask in inside]
 

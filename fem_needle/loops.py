@@ -7,9 +7,7 @@ from importlib.util import find_spec
 
 from fem_needle.errors import SceneError
 from fem_needle.legs.equilibria import equilibrium_march
-from fem_needle.legs.vibrations import modal_march
 from fem_needle.march import RunEnd, TimeGrid, march
-from fem_needle.modal_stepper import ModalStepper
 from fem_needle.plant import Plant
 from fem_needle.pushed_march import march_pushed
 from fem_needle.samples import Sample
@@ -35,8 +33,6 @@ def run_loop(plant: Plant, stepper: Stepper, grid: TimeGrid) -> Generator[Sample
     if plant.has_table and plant.scene.numerics.loop == "auto":
         if isinstance(stepper, StaticStepper) and not _loses_digits(plant):
             return equilibrium_march(plant, stepper, grid)
-        if isinstance(stepper, ModalStepper):
-            return modal_march(plant, stepper, grid)
     if is_compiled(plant, stepper, grid) and isinstance(stepper, DynamicStepper):
         from fem_needle.legs.compiled import compiled_march
 

@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 from fem_needle.choices import likely_duration, longest_period
 from fem_needle.detuning import detuning
+from fem_needle.dynamics.grid import RunEnd, TimeGrid, time_grid
 from fem_needle.errors import ComputationError
 from fem_needle.expectation import Expectation, expectation
 from fem_needle.limits import check_steps
-from fem_needle.march import RunEnd, TimeGrid, time_grid
 from fem_needle.motion import shortest_period
-from fem_needle.run_job import Job, begin, collect, shown, stepper_of, total_error, trajectory_of
+from fem_needle.run_job import Job, begin, collect, integration, shown, total_error, trajectory_of
 from fem_needle.sample_arrays import Samples, joined
-from fem_needle.steppers import DynamicStepper
 from fem_needle.trajectory import Trajectory, guide_advice
 
 Array = NDArray[np.float64]
@@ -288,8 +287,8 @@ def difference(coarser: _Trial, finer: _Trial) -> float:
 
 def is_undamped(job: Job) -> bool:
     """Return whether the integrator has a spectral radius of 1, and with it its full order."""
-    stepper = stepper_of(job)
-    return isinstance(stepper, DynamicStepper) and abs(float(np.sum(stepper.method.nodes)) - 1.0) < 1e-12
+    method = integration(job).method
+    return method is not None and abs(float(np.sum(method.nodes)) - 1.0) < 1e-12
 
 
 def resolving_step(job: Job) -> float:

@@ -8,17 +8,15 @@ from typing import Any, Protocol
 
 from fem_needle.choices import Choice
 from fem_needle.collocation import collocation
+from fem_needle.dynamics.grid import RunEnd, TimeGrid, time_grid
+from fem_needle.dynamics.run import VIBRATION, Integration, integration_of, run_samples, spectral_radius
+from fem_needle.dynamics.vibration import needs_no_steps
 from fem_needle.errors import ComputationError
-from fem_needle.loops import run_loop
-from fem_needle.march import RunEnd, TimeGrid, failing_as_step, time_grid
-from fem_needle.modal_stepper import ModalStepper, needs_no_steps
 from fem_needle.models import ChosenPlant
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples, joined
-from fem_needle.samples import in_blocks
 from fem_needle.scene import Scene
-from fem_needle.skipping import inertia_free_stepper
-from fem_needle.steppers import DynamicStepper, Inviscid, StaticStepper, Stepper
+from fem_needle.steppers import DynamicStepper, Inviscid, Massless, StaticStepper
 from fem_needle.trajectory import Trajectory, energy_warnings, summary_of, trajectory_from_samples
 
 
@@ -82,34 +80,26 @@ def shown(job: Job, run: Trajectory, samples: Samples) -> Trajectory:
     return run
 
 
-def stepper_of(job: Job) -> Stepper:
+def integration(job: Job) -> Integration:
     """Return how the needle gets from one time to the next."""
     if job.choice.analysis == "dynamic" and job.scene.numerics.time_step == "auto" and needs_no_steps(job.plant.scene):
-        return ModalStepper(job.plant)
-    return time_stepper(job.plant, job.scene, job.choice.analysis)
+        return Integration(VIBRATION)
+    return integration_of(job.plant, job.scene, job.choice.analysis)
 
 
-def time_stepper(plant: Plant, scene: Scene, analysis: str) -> Stepper:
-    """Return how a needle is stepped: with inertia ("dynamic"), without it ("quasi-static"), or through equilibria ("static")."""
+def time_stepper(plant: Plant, scene: Scene, analysis: str) -> Any:
+    """Return how closed loops are stepped, until they have moved."""
     if analysis == "dynamic":
-        return DynamicStepper(plant, collocation(_spectral_radius(plant, scene)))
-    if analysis == "static":
-        return StaticStepper(Inviscid(plant))
-    return inertia_free_stepper(plant)
-
-
-def _spectral_radius(plant: Plant, scene: Scene) -> float:
-    """Return the scene's, lowered where the plant needs it to stay stable while it moves."""
-    asked = scene.numerics.spectral_radius
-    lowest, highest = scene.insertion.depth_range(scene.duration)
-    moves = highest > lowest or scene.insertion.kind in {"force", "speed"}  # a speed of 0 may be commanded to change
-    return min(asked, plant.largest_spectral_radius) if moves else asked
+        return DynamicStepper(plant, collocation(spectral_radius(plant, scene)))
+    massless: Any = Inviscid(plant) if analysis == "static" else Massless(plant)
+    found = integration_of(plant, scene, analysis)
+    return StaticStepper(massless) if found.method is None else DynamicStepper(massless, found.method, inertia=False)
 
 
 def rounding_warnings(job: Job) -> tuple[str, ...]:
     """Return the warning of a mesh whose stiffness matrix loses more digits in time steps than the tolerance allows."""
     loss, tolerance = job.plant.stiffness_round_off, job.scene.numerics.tolerance
-    if loss <= tolerance or isinstance(stepper_of(job), StaticStepper | ModalStepper):
+    if loss <= tolerance or not integration(job).steps:
         return ()  # neither steps; frequencies are quotients of energies, which lose less
     return (
         f"rounding may cost {loss:.1e} of the tip > numerics.tolerance = {tolerance:g}: time steps subtract element stiffnesses "
@@ -119,7 +109,7 @@ def rounding_warnings(job: Job) -> tuple[str, ...]:
 
 def _warnings(job: Job) -> list[str]:
     found = [*job.plant.warnings, *rounding_warnings(job), *job.chosen.warnings]
-    radius, asked = _spectral_radius(job.plant, job.scene), job.scene.numerics.spectral_radius
+    radius, asked = spectral_radius(job.plant, job.scene), job.scene.numerics.spectral_radius
     if job.choice.analysis == "dynamic" and radius < asked:
         found.append(
             f"numerics.spectral_radius = {asked:g} > {radius:g}, with which this model stays stable while it moves: "
@@ -142,19 +132,16 @@ def collect(job: Job, grid: TimeGrid, blocks: list[Samples], *, live: bool) -> R
         With ``partial``, the trajectory so far.
     """
     try:
-        marching = in_blocks(run_loop(job.plant, stepper_of(job), grid))
-        time, depth = 0.0, job.scene.insertion.first_depth
+        marching = run_samples(job.plant, integration(job), grid)
         while True:
             try:
-                with failing_as_step(time, depth):
-                    block = next(marching)
+                block = next(marching)
             except StopIteration as finished:
-                if blocks and time < grid.outputs[-1]:
+                if blocks and blocks[-1].time[-1] < grid.outputs[-1]:
                     job.observer.progress(1.0)  # it ended before its time
                 return finished.value
             blocks.append(block)
-            time, depth = float(block.time[-1]), float(block.depth[-1])
-            job.observer.progress(time / grid.outputs[-1])
+            job.observer.progress(float(block.time[-1]) / grid.outputs[-1])
             if live:
                 job.observer.samples(block)
     except KeyboardInterrupt:
@@ -191,15 +178,10 @@ def trajectory_of(job: Job, grid: TimeGrid, samples: Samples, time_error: float 
 def _settings(job: Job, grid: TimeGrid) -> dict[str, Any]:
     return job.plant.describe() | {
         "analysis": job.choice.analysis,
-        "time_step": largest_step(grid),
+        "time_step": grid.largest_step,
         "steps": grid.steps,
         "skipped": [asdict(skipped) for skipped in job.choice.skipped],
     }
-
-
-def largest_step(grid: TimeGrid) -> float:
-    """Return the largest step [s]."""
-    return max((end - start) / count for start, end, count in grid.intervals())
 
 
 def total_error(job: Job, time_error: float) -> float | None:

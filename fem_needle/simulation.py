@@ -10,16 +10,16 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from fem_needle.choices import choose, first_time_step
+from fem_needle.dynamics.engine import REST
+from fem_needle.dynamics.run import VIBRATION
 from fem_needle.errors import SceneError, SuspiciousValueWarning
 from fem_needle.mesh_file import mesh_positions
-from fem_needle.modal_stepper import ModalStepper
 from fem_needle.models import ChosenPlant, model_family
 from fem_needle.plant import Plant
 from fem_needle.refined_run import run_refined
-from fem_needle.run_job import Job, Nobody, Observer, rounding_warnings, run_live, stepper_of
+from fem_needle.run_job import Job, Nobody, Observer, integration, rounding_warnings, run_live
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
-from fem_needle.steppers import StaticStepper
 from fem_needle.threads import one_thread
 from fem_needle.trajectory import Trajectory
 
@@ -164,9 +164,9 @@ def _run(job: Job) -> Trajectory:
     given, analysis = job.scene.numerics.time_step, job.choice.analysis
     if isinstance(given, float):
         return run_live(job, given, None)
-    stepper = stepper_of(job)
-    if isinstance(stepper, ModalStepper):
+    kind = integration(job).kind
+    if kind == VIBRATION:
         return run_live(job, job.choice.output_step, 0.0)
-    if isinstance(stepper, StaticStepper):
+    if kind == REST:
         return run_live(job, first_time_step(job.plant, analysis, job.choice.output_step), 0.0)
     return run_refined(job)

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from fem_needle.collocation import collocation
-from fem_needle.plant import Plant
 from fem_needle.scene import LateralLoad, Scene
 from fem_needle.segments import one_layer_holds
-from fem_needle.steppers import DynamicStepper, Massless, StaticStepper, Stepper
 
 INERTIA_SHARE = 0.25  # of the tolerance: what leaving out inertia may cost
 
@@ -20,15 +17,6 @@ class Skipped:
 
     term: str
     reason: str
-
-
-def inertia_free_stepper(plant: Plant) -> Stepper:
-    """Return equilibria where the tissue has no memory, creep (L-stable) where it is viscous or remembers a path."""
-    tissue = plant.scene.tissue
-    remembers = tissue.rest_line == "cut-path" or plant.scene.insertion.kind == "force"
-    if remembers or any(layer.damping > 0 for layer in tissue.layers):
-        return DynamicStepper(Massless(plant), collocation(0.0), inertia=False)
-    return StaticStepper(Massless(plant))
 
 
 Rule = Callable[[Scene], str]  # why a scene does not need a term, "" where it does

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.dynamics.grid import output_times
 from fem_needle.errors import SceneError
-from fem_needle.march import output_times
 from fem_needle.motion import run_duration
 from fem_needle.scene import Scene
 from fem_needle.scene_file import load_scene

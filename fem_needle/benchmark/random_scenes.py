@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from fem_needle.benchmark.growing_beam import spectral_tips
 from fem_needle.benchmark.reference import growing_beam
+from fem_needle.dynamics.grid import output_times
 from fem_needle.exact import exact_static
-from fem_needle.march import output_times
 from fem_needle.motion import depth_law, run_duration
 from fem_needle.scene import Scene
 

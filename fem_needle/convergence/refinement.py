@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.choices import choose, first_time_step
+from fem_needle.dynamics.engine import REST
+from fem_needle.dynamics.run import without_inertia
 from fem_needle.errors import SceneError
 from fem_needle.loads import is_steady
 from fem_needle.models import model_family
@@ -23,9 +25,7 @@ from fem_needle.rounding import round_off
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
 from fem_needle.simulation import simulate
-from fem_needle.skipping import inertia_free_stepper
 from fem_needle.statics import solve_static
-from fem_needle.steppers import StaticStepper
 
 Array = NDArray[np.float64]
 
@@ -209,7 +209,7 @@ def _is_series_of_equilibria(scene: Scene, plant: Plant) -> bool:
         return False
     if scene.numerics.analysis == "static":
         return True
-    if scene.numerics.analysis == "quasi-static" and isinstance(inertia_free_stepper(plant), StaticStepper):
+    if scene.numerics.analysis == "quasi-static" and without_inertia(scene).kind == REST:
         return True
     rests = scene.insertion.kind == "hold" and is_steady(scene)
     return rests and scene.initial.shape == "equilibrium" and scene.tissue.rest_line == "straight"

@@ -115,7 +115,7 @@ class Engine:
         work.put(at.RECORDS, record)
         cursor[:] = 0, 0, 0, int(from_start)
         self.limits[at.COUNTED] = float(counted)
-        status = int(self._run(work.table))
+        status = self._run(work.table)
         if self._answers is not None:
             self._answers.callback.check()
             self._set_clamp_reactions(record[: cursor[2]])

@@ -352,7 +352,7 @@ def take_step(arrays, t, h, until, is_last, is_output):
     return status
 
 
-@entrance
+@entrance("time loop", 150)
 def run_steps(arrays):
     """Take the steps of smooth intervals; returns how it ended (`names`: DONE, FAILED, EVENT, DIVERGED).
 

@@ -191,7 +191,7 @@ class Push:
             kind = "reaches"
         if status != at.EVENT:  # A jumps where the tip passes an interface, a guide comes to an end at the hub: stop there
             if level is None:
-                raise failed_step(time, depth, _WHY[status])
+                raise failed_step(time, depth, WHY[status])
             kind = "reaches"
         found = self._located(kind, level or 0.0, until, direction)
         if found is None:
@@ -318,7 +318,7 @@ class Push:
         return driving + slack < hold.inward and driving - slack > -hold.outward
 
 
-_WHY: dict[int, str] = {at.FAILED: "the deflection is not finite", at.DIVERGED: "the insertion speed does not converge"}
+WHY: dict[int, str] = {at.FAILED: "the deflection is not finite", at.DIVERGED: "the insertion speed does not converge"}
 
 
 def _between(low: float, high: float, low_value: float, high_value: float) -> float:

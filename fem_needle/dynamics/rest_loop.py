@@ -248,7 +248,7 @@ def take_rest(arrays, t, h, until, is_output):
     return DONE
 
 
-@entrance
+@entrance("equilibria", 90)
 def run_rests(arrays):
     """Go through the equilibria of smooth intervals, as `fem_needle.dynamics.loop.run_steps` goes through steps."""
     intervals, cursor, axial = floats_2(arrays, INTERVALS), integers_1(arrays, CURSOR), floats_1(arrays, AXIAL_STATE)

@@ -10,10 +10,10 @@ import numpy as np
 import scipy  # its parts are loaded where they are used
 from numpy.typing import NDArray
 
+from fem_needle.dynamics.vibration import needs_no_steps
 from fem_needle.errors import SceneError
 from fem_needle.identification.measurements import Measurements
 from fem_needle.identification.static_model import Place, StaticProblem, static_problem
-from fem_needle.modal_stepper import needs_no_steps
 from fem_needle.motion import run_duration
 from fem_needle.scene import Scene
 from fem_needle.simulation import run_scene

@@ -7,28 +7,25 @@ about the equilibrium q_e under the loads; a and b follow from the state at the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
-from fem_needle.collocation import Collocation, collocation
 from fem_needle.free_response import frozen_matrices, vibrations
 from fem_needle.initial import initial_state
-from fem_needle.ledger import StepEnd
+from fem_needle.ledger import StepEnd, configuration_force, form
 from fem_needle.loads import is_steady, turns_with_needle
-from fem_needle.motion import Motion, depth_law
+from fem_needle.motion import depth_law
 from fem_needle.plant import Plant
+from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene
-from fem_needle.stages import StageSolution, momentum
+from fem_needle.stages import StageSolution
 from fem_needle.statics import static_state
-from fem_needle.steppers import Step
 
 Array = NDArray[np.float64]
-
-RESOLVED = 1e-2  # of 1 / omega of the highest mode: a step in which every rate is resolved
 
 
 def needs_no_steps(scene: Scene) -> bool:
@@ -85,32 +82,18 @@ class Vibration:
         columns = np.vstack([np.zeros((clamped, shapes.shape[1])), shapes])
         return operators.beam.bending_forms(columns), banded.to_dense(banded.trailing(operators.tissue, clamped))
 
-    @property
-    def resolved_time(self) -> float:
-        """A time [s] in which even the fastest vibration hardly moves."""
-        return RESOLVED / float(self._modes[0][-1])
-
-    def at(self, time: float) -> StepEnd:
-        """Return the state at a time [s]."""
-        frequencies, shapes, cosines, sines = self._modes
-        clamped, phases = self.plant.prescribed, frequencies * (time - self.origin.stage.instant.time)
-        coordinates, velocities = self._rest.copy(), np.zeros_like(self._rest)
-        coordinates[clamped:] += shapes @ (cosines * np.cos(phases) + sines * np.sin(phases))
-        velocities[clamped:] = shapes @ (frequencies * (sines * np.cos(phases) - cosines * np.sin(phases)))
-        stage = replace(self.origin.stage, instant=replace(self.origin.stage.instant, time=time))
-        forces = self.origin.solution.forces
-        return StepEnd(stage, StageSolution(coordinates, velocities, momentum(stage, coordinates, velocities), forces))
-
-    def over(self, times: Array) -> tuple[Array, Array]:
-        """Return coordinates and velocities at many times [s] (T, n)."""
+    def over(self, times: Array) -> tuple[Array, Array, Array]:
+        """Return coordinates, velocities and accelerations at many times [s] (T, n)."""
         frequencies, shapes, cosines, sines = self._modes
         phases = np.outer(times - self.origin.stage.instant.time, frequencies)
         cosine, sine = np.cos(phases), np.sin(phases)
         coordinates = np.tile(self._rest, (len(times), 1))
-        velocities, clamped = np.zeros_like(coordinates), self.plant.prescribed
-        coordinates[:, clamped:] += (cosines * cosine + sines * sine) @ shapes.T
+        velocities, accelerations = np.zeros_like(coordinates), np.zeros_like(coordinates)
+        clamped, away = self.plant.prescribed, cosines * cosine + sines * sine
+        coordinates[:, clamped:] += away @ shapes.T
         velocities[:, clamped:] = (frequencies * (sines * cosine - cosines * sine)) @ shapes.T
-        return coordinates, velocities
+        accelerations[:, clamped:] = -(frequencies**2 * away) @ shapes.T
+        return coordinates, velocities, accelerations
 
     def tips(self, times: Array) -> Array:
         """Return the tip deflections [m] at times [s]."""
@@ -149,47 +132,74 @@ def vibrating_tips(plant: Plant, times: Array) -> Array:
     return Vibration(plant, initial_state(plant, depth_law(plant.scene))).tips(times)
 
 
-@dataclass(frozen=True, eq=False)
-class ModalStep(Step):
-    """A step of any length; its rates are taken on a short one at its end or at its start."""
-
-    vibration: Vibration = field(kw_only=True)
-
-    def resolved(self, *, at_start: bool) -> Step:
-        """Return the short step with the same start, or the same end."""
-        edge = self.ends[0 if at_start else 1].stage.instant.time
-        start = edge if at_start else edge - self.vibration.resolved_time
-        return _between(self.vibration, self.method, self.vibration.at(start), start + self.vibration.resolved_time)
-
-
-@dataclass(frozen=True, eq=False)
-class ModalStepper:
-    """Goes from one output to the next without steps between."""
-
-    plant: Plant
-    inertia: bool = True
-    method: Collocation = field(default_factory=lambda: collocation(1.0))
-
-    def start(self, law: Motion, time: float, until: float, before: StepEnd) -> StepEnd:
-        """Return the state: nothing jumps while the needle is held."""
-        return before
-
-    def advance(self, law: Motion, start: StepEnd, until: float, last: Step | None) -> Step:
-        """Return the step to a time."""
-        known = last.vibration if isinstance(last, ModalStep) else None
-        return _between(known or Vibration(self.plant, start), self.method, start, until)
-
-
-def _between(vibration: Vibration, method: Collocation, start: StepEnd, until: float) -> ModalStep:
-    time = start.stage.instant.time
-    length = until - time
-    nodes = [vibration.at(time + node * length) for node in method.nodes]
-    return ModalStep(
-        vibration.plant,
-        method,
-        length,
-        (start, vibration.at(until)),
-        tuple(node.stage for node in nodes),
-        tuple(node.solution for node in nodes),
-        vibration=vibration,
+def vibration_samples(vibration: Vibration, times: Array) -> Samples:
+    """Return everything that is shown of a vibrating needle at times [s]."""
+    plant, stage, start = vibration.plant, vibration.origin.stage, vibration.origin.solution
+    operators, points, count = stage.operators, stage.points, len(times)
+    coordinates, velocities, accelerations = vibration.over(times)
+    forces = np.tile(start.forces, (count, 1))
+    bent, held = (_products(band, coordinates) for band in (operators.bending, operators.tissue))
+    kinetic = 0.5 * np.sum(velocities * _products(operators.mass, velocities), axis=1)
+    bending = np.sum(coordinates * bent, axis=1)
+    if operators.beam is not None:
+        bending = operators.beam.bending_forms(coordinates.T)
+    kinks = float(start.forces @ points.flexibility @ start.forces)
+    needed = _products(operators.mass, accelerations) + bent + held - points.rows.T @ start.forces
+    axial_forces = np.array([_axial_force(vibration, *state) for state in zip(coordinates, velocities, accelerations, strict=True)])
+    hub = _clamp(plant, needed, stage.instant.depth)
+    moved = (coordinates - start.coordinates) @ points.rows.T
+    none = np.zeros(count)
+    return Samples(
+        time=times.copy(),
+        depth=np.full(count, stage.instant.depth),
+        speed=none,
+        coordinates=coordinates,
+        point_forces=forces,
+        guide_force=np.zeros((count, 0)),
+        push_force=-axial_forces,
+        friction_force=none,
+        tissue_force=-held @ plant.deflection_at_one,
+        hub_force=hub[:, 0],
+        hub_moment=hub[:, 1],
+        kinetic_energy=kinetic,
+        bending_energy=0.5 * (bending + kinks),
+        tissue_energy=0.5 * np.sum(coordinates * held, axis=1),
+        guide_energy=none,
+        load_work=np.sum(forces * moved, axis=1),
+        path_position=np.zeros(0),
+        path_deflection=np.zeros(0),
+        path_points=np.zeros(count, dtype=np.int64),
+        **dict.fromkeys(_NEVER, none),
     )
+
+
+_NEVER = (
+    "hub_work", "tissue_work", "tissue_dissipation", "boundary_energy", "friction_dissipation", "cutting_work", "push_work",
+    "arrest_loss", "axial_kinetic_energy",
+)  # fmt: skip
+
+
+def _products(band: Array, vectors: Array) -> Array:
+    """Return A x of vectors (T, n)."""
+    return np.asarray(vectors @ banded.to_dense(band).T, dtype=float)
+
+
+def _clamp(plant: Plant, needed: Array, depth: float) -> Array:
+    """Return force and moment of the clamp (T, 2), linear in what the first coordinates lack."""
+    units = np.zeros((2, needed.shape[1]))
+    units[0, 0], units[1, 1] = 1.0, 1.0
+    answers = np.array([plant.clamp_reactions(unit, depth) for unit in units])
+    return needed[:, :2] @ answers
+
+
+def _axial_force(vibration: Vibration, coordinates: Array, velocities: Array, accelerations: Array) -> float:
+    """Return A = dL/dz - d/dt (q'.S q) of a held needle [N]."""
+    plant, stage = vibration.plant, vibration.origin.stage
+    if not plant.axial_force_acts:
+        return 0.0
+    solution = StageSolution(coordinates, velocities, velocities, vibration.origin.solution.forces)
+    force = configuration_force(plant, stage, solution)
+    convection = stage.operators.convection
+    if convection is not None:
+        force -= form(convection, accelerations, coordinates) + form(convection, velocities, velocities)
+    return force

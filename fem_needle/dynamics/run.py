@@ -1,0 +1,141 @@
+"""A whole run: how a needle is integrated, and its samples, stretch by stretch between breakpoints."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_needle.collocation import Collocation, collocation
+from fem_needle.dynamics import names as at
+from fem_needle.dynamics.engine import CREEP, DYNAMIC, REST, Engine, failed_step, smooth_stretches
+from fem_needle.dynamics.grid import RunEnd, TimeGrid, ends_by_itself
+from fem_needle.dynamics.massless import massless
+from fem_needle.dynamics.push import STEPS_PER_PERIOD, WHY, Push, run_limits
+from fem_needle.dynamics.vibration import Vibration, vibration_samples
+from fem_needle.initial import initial_state
+from fem_needle.limits import check_steps
+from fem_needle.motion import depth_law, shortest_period
+from fem_needle.plant import Plant
+from fem_needle.sample_arrays import Samples
+from fem_needle.scene import Scene
+
+Array = NDArray[np.float64]
+
+VIBRATION = "vibration"  # of a held needle, in closed form
+SAMPLES_AT_ONCE = 500
+
+
+@dataclass(frozen=True)
+class Integration:
+    """How a needle gets from one time to the next.
+
+    Attributes
+    ----------
+    kind
+        "dynamic", "creep" (without inertia), "rest" (through equilibria) or "vibration" (eigenvectors once, then cosines).
+    method
+        Collocation method of steps.
+    """
+
+    kind: str
+    method: Collocation | None = None
+
+    @property
+    def steps(self) -> bool:
+        """Whether time steps are taken that have an error."""
+        return self.kind in {DYNAMIC, CREEP}
+
+
+def integration_of(plant: Plant, scene: Scene, analysis: str) -> Integration:
+    """Return how a needle is stepped: with inertia ("dynamic"), without it ("quasi-static"), or through equilibria ("static")."""
+    if analysis == "dynamic":
+        return Integration(DYNAMIC, collocation(spectral_radius(plant, scene)))
+    return Integration(REST) if analysis == "static" else without_inertia(plant.scene)
+
+
+def without_inertia(scene: Scene) -> Integration:
+    """Return equilibria where the tissue has no memory, creep (L-stable) where it is viscous or remembers a path."""
+    tissue = scene.tissue
+    remembers = tissue.rest_line == "cut-path" or scene.insertion.kind == "force"
+    if remembers or any(layer.damping > 0 for layer in tissue.layers):
+        return Integration(CREEP, collocation(0.0))
+    return Integration(REST)
+
+
+def spectral_radius(plant: Plant, scene: Scene) -> float:
+    """Return the scene's, lowered where the plant needs it to stay stable while it moves."""
+    asked = scene.numerics.spectral_radius
+    lowest, highest = scene.insertion.depth_range(scene.duration)
+    moves = highest > lowest or scene.insertion.kind in {"force", "speed"}  # a speed of 0 may be commanded to change
+    return min(asked, plant.largest_spectral_radius) if moves else asked
+
+
+def begun(plant: Plant, integration: Integration) -> Engine:
+    """Return a needle at t = 0, as the scene's ``[initial]`` says."""
+    law = depth_law(plant.scene)
+    engine = Engine(plant, integration.kind, integration.method)
+    engine.begin(initial_state(plant if integration.kind == DYNAMIC else massless(plant), law), law.depth(0.0))
+    return engine
+
+
+def run_samples(plant: Plant, integration: Integration, grid: TimeGrid) -> Generator[Samples, None, RunEnd]:
+    """Yield the samples of a run in blocks; the generator's value says how it ended.
+
+    Raises
+    ------
+    ComputationError
+        If a step cannot be solved or gives numbers that are not finite; says at which time and depth.
+    """
+    if integration.kind == VIBRATION:
+        return _vibrating(plant, grid)
+    if plant.scene.insertion.kind == "force" and integration.steps:
+        return _pushed(plant, integration, grid)
+    return _moved(plant, integration, grid)
+
+
+def _moved(plant: Plant, integration: Integration, grid: TimeGrid) -> Generator[Samples, None, RunEnd]:
+    engine, first = begun(plant, integration), True
+    kinks = {0.0, *grid.landings}
+    for at_kink, intervals in smooth_stretches(grid.intervals(), set(grid.outputs), kinks, plant.size):
+        if at_kink:
+            engine.land()
+        status, samples = engine.advance(intervals, counted=not first, from_start=first)
+        first = False
+        if len(samples):
+            yield samples
+        if status != at.DONE:
+            time, depth = float(engine.live.axial[at.NOW]), float(engine.live.axial[at.WAY])
+            raise failed_step(time, depth, WHY[status])
+    return RunEnd("final-depth" if ends_by_itself(plant.scene) else "duration", grid.steps)
+
+
+def _pushed(plant: Plant, integration: Integration, grid: TimeGrid) -> Generator[Samples, None, RunEnd]:
+    """Yield the samples of a pushed needle until something ends its run."""
+    longest = shortest_period(plant.scene) / STEPS_PER_PERIOD
+    check_steps(grid.outputs[-1], longest)
+    engine = begun(plant, integration)
+    push, outputs, first = Push(engine, plant.scene, run_limits(plant.scene)), set(grid.outputs), True
+    start, end, count = next(grid.intervals())
+    push.begin((end - start) / count)
+    for start, end, count in grid.intervals():
+        if start in grid.landings:
+            engine.land()
+        reason, found = push.go(end, min((end - start) / count, longest), output=end in outputs, from_start=first)
+        first = False
+        yield from (samples for samples in found if len(samples))
+        if reason is not None:
+            return RunEnd(reason, int(engine.live.axial[at.STEPS]))
+    return RunEnd("duration", int(engine.live.axial[at.STEPS]))
+
+
+def _vibrating(plant: Plant, grid: TimeGrid) -> Generator[Samples, None, RunEnd]:
+    vibration = Vibration(plant, initial_state(plant, depth_law(plant.scene)))
+    outputs = np.array(grid.outputs)
+    marks = [*range(0, len(outputs), SAMPLES_AT_ONCE), len(outputs)]
+    for first, last in pairwise(marks):
+        yield vibration_samples(vibration, outputs[first:last])
+    return RunEnd("duration", grid.steps)
