@@ -27,11 +27,11 @@ from numpy.typing import NDArray
 from fem_needle.axial import friction_force
 from fem_needle.closed_loop.outcome import Effort, first_arrival, outcome
 from fem_needle.collocation import collocation
+from fem_needle.dynamics.grid import output_times
 from fem_needle.errors import SceneError
 from fem_needle.initial import initial_state
 from fem_needle.ledger import StepEnd, Works, step_works
 from fem_needle.loads import load_case
-from fem_needle.march import output_times
 from fem_needle.motion import Instant, depth_law
 from fem_needle.plant import Plant
 from fem_needle.samples import Sample, sample_step, stacked

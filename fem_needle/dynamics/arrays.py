@@ -56,7 +56,11 @@ def _lookup(kind: Any, c_type: Any, dimensions: int) -> Any:
         """Return the array, in Python."""
         shape = tuple(int(size) for size in table[name, 1 : dimensions + 1])
         total = int(np.prod(shape))
-        return np.frombuffer((c_type * total).from_address(int(table[name, 0])), dtype=c_type).reshape(shape) if total else np.zeros(shape, c_type)
+        return (
+            np.frombuffer((c_type * total).from_address(int(table[name, 0])), dtype=c_type).reshape(shape)
+            if total
+            else np.zeros(shape, c_type)
+        )
 
     compiled = intrinsic(typed)
     from numba.core import config

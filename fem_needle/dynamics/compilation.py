@@ -123,7 +123,9 @@ class _Counter(event.Listener):
     def on_start(self, event: event.Event) -> None:
         if self._depth == 0:
             notice.begun(
-                self._entrance.what, round(_SECONDS_PER_FUNCTION * self._entrance.functions), is_kept=self._entrance.folder is not None
+                self._entrance.what,
+                round(_SECONDS_PER_FUNCTION * self._entrance.functions),
+                is_kept=self._entrance.folder is not None,
             )
         self._depth += 1
 

@@ -158,5 +158,7 @@ def load_rows(scene: Scene) -> list[Array]:
 
 def bevel_of(scene: Scene) -> Array:
     """Return the bevel coefficient of each tip load [m^2], NaN where its force is given (tips,)."""
-    found = [np.nan if load.bevel_coefficient is None else load.bevel_coefficient for load in scene.loads if isinstance(load, TipLoad)]
+    found = [
+        np.nan if load.bevel_coefficient is None else load.bevel_coefficient for load in scene.loads if isinstance(load, TipLoad)
+    ]
     return np.array(found, dtype=float)

@@ -97,7 +97,7 @@ class Answers:
         tissue[at.DAMPING], tissue[at.SLIP] = _dense(operators.damping, len(beam[0])), _dense(operators.slip, len(beam[0]))
         tissue[at.DRAG] = -_dense(operators.drag, len(beam[0]))
         if not work[at.SWITCH][at.VISCOUS]:
-            tissue[at.DAMPING:] = 0.0
+            tissue[at.DAMPING :] = 0.0
         work[at.POINT_ROWS][instant], work[at.POINT_RATES][instant] = points.rows, points.row_rates
         work[at.FLEXIBLE][instant], work[at.FLEXIBLE_RATE][instant] = points.flexibility, points.flexibility_rate
         self._directions(instant, operators)

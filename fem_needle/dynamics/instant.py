@@ -132,7 +132,12 @@ def set_tip_force(arrays, middle, known, course, forces, force_rates):
 def prepare_matrices(arrays, at, changed):
     """Form the matrices of an instant, and mark blocks that are others than before."""
     switches, numbers, layers = integers_1(arrays, SWITCH), floats_1(arrays, NUMBER), floats_2(arrays, LAYER)
-    nodes, coef, quad, shape = floats_1(arrays, PIECE_NODES), floats_3(arrays, COEFFICIENTS), floats_2(arrays, RULE), floats_2(arrays, SHAPE)
+    nodes, coef, quad, shape = (
+        floats_1(arrays, PIECE_NODES),
+        floats_3(arrays, COEFFICIENTS),
+        floats_2(arrays, RULE),
+        floats_2(arrays, SHAPE),
+    )
     course, tissue, covered = floats_2(arrays, COURSES)[at], floats_5(arrays, TISSUE_BLOCKS)[at], floats_3(arrays, COVERED)[at]
     if switches[STRIDE]:
         units, fresh = floats_4(arrays, UNIT), floats_2(arrays, FRESH)

@@ -20,6 +20,7 @@ from fem_needle.dynamics.dense import solve_small
 from fem_needle.dynamics.energy import bending_energy, kinetic_energy, tissue_energy
 from fem_needle.dynamics.guides import soft_reactions
 from fem_needle.dynamics.instant import beam_at, prepare_matrices, prepare_points
+from fem_needle.dynamics.jump_works import force_jump_works, momentum_jump_works
 from fem_needle.dynamics.lateral import solve_nodes
 from fem_needle.dynamics.names import (
     ACCELERATION,
@@ -28,7 +29,6 @@ from fem_needle.dynamics.names import (
     ARRESTED,
     AXIAL_STATE,
     BEAM,
-    BENDING_STIFFNESS,
     BOUNDARY,
     CHANGED,
     CHOSEN,
@@ -40,7 +40,6 @@ from fem_needle.dynamics.names import (
     CUTS,
     DAMPING,
     DEEPEST,
-    DEGREE,
     DENSE,
     END,
     FACTOR,
@@ -50,12 +49,9 @@ from fem_needle.dynamics.names import (
     GAPS,
     GUIDES,
     HELD,
-    HUB_WORK,
     INERTIA,
     INSTANT_SUMS,
     IS_PUSHED,
-    KEPT_HELD,
-    KEPT_LATERAL,
     KINK,
     KNOWN,
     LANDED,
@@ -71,7 +67,6 @@ from fem_needle.dynamics.names import (
     LEDGER_STATE,
     LENGTH,
     LIMITS,
-    LOAD_WORK,
     MASS,
     MASS_PER_LENGTH,
     METHOD,
@@ -81,8 +76,6 @@ from fem_needle.dynamics.names import (
     OWN_DEPTH,
     OWN_SIDE,
     PACE,
-    PATH_LOAD,
-    PIECE_NODES,
     POINT_FIRST,
     POINT_RATES,
     POINT_ROWS,
@@ -101,14 +94,13 @@ from fem_needle.dynamics.names import (
     STRIDE,
     SWITCH,
     TIME,
-    TISSUE,
     TISSUE_BLOCKS,
     VECTORS,
     VISCOUS,
     WEIGHTS,
 )
-from fem_needle.dynamics.points import along, deflection_at
-from fem_needle.dynamics.products import add_covered, add_product, bending_form, covered_form
+from fem_needle.dynamics.points import along
+from fem_needle.dynamics.products import add_covered, add_product
 from fem_needle.dynamics.reduced import solve_mass
 from fem_needle.dynamics.stepping import finish, set_path_constants, set_velocities, tip_of
 from fem_needle.dynamics.works import load_product, set_sums
@@ -218,7 +210,11 @@ def strike(arrays):
     """Let rigid guides strike: N q' + v dN/dz q = 0 holds again."""
     rates, first = floats_3(arrays, POINT_RATES)[START], integers_2(arrays, POINT_FIRST)[START]
     rows, lateral, gaps = floats_3(arrays, POINT_ROWS)[START], floats_3(arrays, LATERAL)[0], floats_1(arrays, GAPS)
-    speed, chosen, clamped = floats_2(arrays, COURSES)[START, SPEED], integers_1(arrays, CHOSEN), integers_1(arrays, SWITCH)[PRESCRIBED]
+    speed, chosen, clamped = (
+        floats_2(arrays, COURSES)[START, SPEED],
+        integers_1(arrays, CHOSEN),
+        integers_1(arrays, SWITCH)[PRESCRIBED],
+    )
     count = answers_of_mass(arrays)
     mobility(arrays, count)
     for one in range(count):
@@ -301,115 +297,83 @@ def left_velocities(arrays, pace):
 
 
 @inner
-def force_jump_works(arrays, jumped):
-    """Add the works where the needle follows at once: mean force times jump of deflection; of a clamp that ``jumped``, what resists.
-
-    What resists is the change of bending and tissue energy less what the points do: viscosity takes as much as time is left, and
-    stands on neither side.
-    """
-    switches, left, held = integers_1(arrays, SWITCH), floats_2(arrays, KEPT_LATERAL)[0], floats_1(arrays, KEPT_HELD)
-    rows, first, flexible = floats_3(arrays, POINT_ROWS)[START], integers_2(arrays, POINT_FIRST)[START], floats_3(arrays, FLEXIBLE)[START]
-    forces, known, ledger = floats_2(arrays, FORCES)[START], floats_2(arrays, KNOWN)[START], floats_1(arrays, LEDGER_STATE)
-    taken = 0.0
-    for point in range(len(forces)):
-        mean = 0.5 * (forces[point] + held[point])
-        moved = deflection_at(point, rows, first, flexible, known, forces)
-        if point >= switches[GUIDES]:
-            ledger[LOAD_WORK] += mean * (moved - deflection_at(point, rows, first, flexible, left, held))
-        taken += mean * (along(rows[point], first[point], known) - along(rows[point], first[point], left))
-    if jumped:
-        ledger[HUB_WORK] += elastic_energy(arrays, known, left) - taken
+def set_left(arrays, jumped):
+    """Set coordinates and guides' forces at the start to those before it, and let a needle with inertia follow a clamp that jumps."""
+    known, lateral = floats_2(arrays, KNOWN), floats_3(arrays, LATERAL)[0]
+    if jumped and integers_1(arrays, SWITCH)[INERTIA]:
+        carry(arrays)
+    for i in range(known.shape[1]):
+        known[START, i] = lateral[0, i]
+    for guide in range(integers_1(arrays, SWITCH)[GUIDES]):
+        floats_2(arrays, FORCES)[START, guide] = floats_1(arrays, HELD)[guide]
+    if integers_1(arrays, SWITCH)[CUTS]:
+        set_history(arrays, START)
 
 
 @inner
-def elastic_energy(arrays, right, left):
-    """Return the change of 1/2 q.(K + m G) q - m q.H from one state to another."""
-    switches, course, beams = integers_1(arrays, SWITCH), floats_2(arrays, COURSES)[START], floats_5(arrays, BEAM)
-    tissue, covered, load = floats_5(arrays, TISSUE_BLOCKS)[START], floats_3(arrays, COVERED)[START], floats_2(arrays, PATH_LOAD)[START]
-    beam, nodes, total = beams[beam_at(beams, START)], floats_1(arrays, PIECE_NODES), 0.0
-    stretch, stiffness = course[STRETCH], floats_1(arrays, NUMBER)[BENDING_STIFFNESS]
-    for side in range(2):
-        q, sign = right if side == 0 else left, 1.0 if side == 0 else -1.0
-        bent = bending_form(beam, switches[STRIDE], switches[DEGREE], stiffness, nodes, q) / (stretch * stretch * stretch)
-        held = course[FACTOR] * stretch * covered_form(tissue, TISSUE, covered, switches[STRIDE], q, q)
-        total += sign * 0.5 * (bent + held)
-        if switches[CUTS]:
-            total -= sign * course[FACTOR] * along(load, 0, q)
-    return total
+def set_start_path(arrays):
+    """Set the path's terms at the start; a needle that has followed a jump cuts on from where it is."""
+    axial, tip = floats_1(arrays, AXIAL_STATE), tip_of(arrays, START)
+    if floats_2(arrays, COURSES)[START, OWN_DEPTH] >= axial[DEEPEST] * (1.0 - ROUNDINGS):
+        axial[FRONT] = tip
+    set_history(arrays, START)
+    set_path_constants(arrays, START, tip)
 
 
 @inner
-def momentum_jump_works(arrays, pace, jumped):
-    """Add the works at a jump of speed or of the hub's velocity: mean velocity times jump of momentum."""
-    axial, ledger, clamp = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LEDGER_STATE), floats_3(arrays, CLAMP)[START]
-    lateral, left, rates = floats_3(arrays, LATERAL)[0], floats_2(arrays, KEPT_LATERAL), floats_2(arrays, RATES)[START]
-    sums, speed, struck = floats_2(arrays, INSTANT_SUMS)[START], floats_2(arrays, COURSES)[START, SPEED], 0.0
-    ledger[BOUNDARY] += 0.5 * (pace + speed) * (sums[S_MOMENTUM] - axial[LAST_AXIAL_MOMENTUM])
-    rate, turn = 0.5 * (axial[LAST_HUB_RATE] + clamp[1, 0]), 0.5 * (axial[LAST_ANGLE_RATE] + clamp[1, 1])
-    ledger[HUB_WORK] += rate * (lateral[1, 0] - left[1, 0]) + turn * (lateral[1, 1] - left[1, 1])
-    for i in range(integers_1(arrays, SWITCH)[PRESCRIBED], len(rates)):
-        change = lateral[1, i] - left[1, i]
-        if change != 0.0:  # a guide's strike, or the momentum that viscous tissue leaves
-            struck += 0.5 * (floats_2(arrays, SIDES)[0, i] + rates[i]) * change
-    ledger[HUB_WORK if jumped else BOUNDARY] += struck
+def book_arrest(arrays, pace, gained):
+    """Book what is lost of the needle's own energy where a membrane has stopped it and the lateral motion did not take it."""
+    numbers, axial = floats_1(arrays, NUMBER), floats_1(arrays, AXIAL_STATE)
+    if axial[ARRESTED] != 0.0:
+        kinetic = 0.5 * numbers[MASS_PER_LENGTH] * numbers[LENGTH] * pace * pace
+        floats_1(arrays, LEDGER_STATE)[ARREST_LOSS] += kinetic - gained
+    axial[ARRESTED], axial[LAST_PACE] = 0.0, floats_2(arrays, COURSES)[START, SPEED]
+
+
+@inner
+def remember(arrays):
+    """Keep what the works of the first step need of its start."""
+    axial, sums, course = floats_1(arrays, AXIAL_STATE), floats_2(arrays, INSTANT_SUMS)[START], floats_2(arrays, COURSES)[START]
+    lateral, clamp = floats_3(arrays, LATERAL)[0], floats_3(arrays, CLAMP)[START]
+    for point in range(len(floats_1(arrays, HELD))):
+        floats_1(arrays, HELD)[point] = floats_2(arrays, FORCES)[START, point]
+    axial[LAST_POWER], axial[LAST_AXIAL_MOMENTUM] = sums[S_POWER], sums[S_MOMENTUM]
+    axial[LAST_PRODUCT], axial[LAST_AXIAL_PRODUCT] = load_product(arrays, START), course[SPEED] * sums[S_MOMENTUM]
+    axial[LAST_HUB_PRODUCT] = clamp[1, 0] * lateral[1, 0] + clamp[1, 1] * lateral[1, 1]
 
 
 @inner
 def land(arrays, h):
     """Begin a call or a row of steps: the instant at its start, what a kink does to the state, and its works."""
-    switches, axial, limits = integers_1(arrays, SWITCH), floats_1(arrays, AXIAL_STATE), floats_1(arrays, LIMITS)
-    lateral, known, clamp = floats_3(arrays, LATERAL)[0], floats_2(arrays, KNOWN), floats_3(arrays, CLAMP)[START]
-    course, pace = floats_2(arrays, COURSES)[START], axial[LAST_PACE]
+    axial, limits, course = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LIMITS), floats_2(arrays, COURSES)[START]
+    inertia, pace = integers_1(arrays, SWITCH)[INERTIA] != 0, axial[LAST_PACE]
     is_kink, counted = axial[LANDED] == KINK, limits[COUNTED] != 0.0 and axial[LANDED] == KINK
-    jumped, changed = clamp_jumps(arrays) and is_kink, loads_jump(arrays)
-    is_held = limits[IS_PUSHED] != 0.0
-    strikes = (is_kink or is_held) and switches[INERTIA] != 0 and has_rigid_guides(arrays)
-    for i in range(known.shape[1]):
-        known[START, i] = lateral[0, i]
-    if switches[INERTIA] and (jumped or strikes):
+    jumped, changed = clamp_jumps(arrays) and is_kink, loads_jump(arrays) and is_kink
+    strikes = (is_kink or limits[IS_PUSHED] != 0.0) and inertia and has_rigid_guides(arrays)
+    for i in range(floats_2(arrays, KNOWN).shape[1]):
+        floats_2(arrays, KNOWN)[START, i] = floats_3(arrays, LATERAL)[0, 0, i]
+    if inertia and (jumped or strikes):
         left_velocities(arrays, pace)
-    if jumped and switches[INERTIA]:
-        carry(arrays)
-        for i in range(known.shape[1]):
-            known[START, i] = lateral[0, i]
-    for guide in range(switches[GUIDES]):
-        floats_2(arrays, FORCES)[START, guide] = floats_1(arrays, HELD)[guide]
-    if switches[CUTS]:
-        set_history(arrays, START)
-    if switches[INERTIA] and (jumped or changed) and is_kink:
+    set_left(arrays, jumped)
+    if inertia and (jumped or changed):
         soften(arrays)
     set_velocities(arrays, START)
     if strikes:
         strike(arrays)
-    if not switches[INERTIA] and is_kink and (jumped or changed or not counted):
+    if not inertia and is_kink and (jumped or changed or not counted):
         follow(arrays, h)
-    if switches[CUTS]:
-        if course[OWN_DEPTH] >= axial[DEEPEST] * (1.0 - ROUNDINGS):
-            axial[FRONT] = tip_of(arrays, START)  # a needle that has followed a jump cuts on from where it is
-        set_history(arrays, START)
-        set_path_constants(arrays, START, tip_of(arrays, START))
+    if integers_1(arrays, SWITCH)[CUTS]:
+        set_start_path(arrays)
     if is_kink and course[OWN_SIDE] < floats_1(arrays, NUMBER)[SMALLEST_DEPTH]:
         drop(arrays)
     elif counted:
         force_jump_works(arrays, jumped)
-    set_sums(arrays, START, known.shape[1] > 0)
+    set_sums(arrays, START, h > 0.0)
     axial[PACE] = course[SPEED]
     if is_kink:
         axial[NODE_PACE_1], axial[NODE_PACE_2] = course[SPEED], course[SPEED]
-    if (counted or (strikes and axial[STEPS] > 0.0)) and switches[INERTIA]:
-        before = floats_1(arrays, LEDGER_STATE)[BOUNDARY]
+    before = floats_1(arrays, LEDGER_STATE)[BOUNDARY]
+    if inertia and (counted or (strikes and axial[STEPS] > 0.0)):
         momentum_jump_works(arrays, pace, jumped)
-        gained = floats_1(arrays, LEDGER_STATE)[BOUNDARY] - before
-        if axial[ARRESTED] != 0.0:  # what the lateral motion does not take of the needle's own energy is lost
-            mass = floats_1(arrays, NUMBER)[MASS_PER_LENGTH] * floats_1(arrays, NUMBER)[LENGTH]
-            floats_1(arrays, LEDGER_STATE)[ARREST_LOSS] += 0.5 * mass * pace * pace - gained
-    elif axial[ARRESTED] != 0.0:
-        mass = floats_1(arrays, NUMBER)[MASS_PER_LENGTH] * floats_1(arrays, NUMBER)[LENGTH]
-        floats_1(arrays, LEDGER_STATE)[ARREST_LOSS] += 0.5 * mass * pace * pace
-    axial[ARRESTED], axial[LAST_PACE] = 0.0, course[SPEED]
-    for point in range(len(floats_1(arrays, HELD))):
-        floats_1(arrays, HELD)[point] = floats_2(arrays, FORCES)[START, point]
-    sums = floats_2(arrays, INSTANT_SUMS)[START]
-    axial[LAST_POWER], axial[LAST_AXIAL_MOMENTUM] = sums[S_POWER], sums[S_MOMENTUM]
-    axial[LAST_PRODUCT], axial[LAST_AXIAL_PRODUCT] = load_product(arrays, START), course[SPEED] * sums[S_MOMENTUM]
-    axial[LAST_HUB_PRODUCT] = clamp[1, 0] * lateral[1, 0] + clamp[1, 1] * lateral[1, 1]
+    book_arrest(arrays, pace, floats_1(arrays, LEDGER_STATE)[BOUNDARY] - before)
+    remember(arrays)

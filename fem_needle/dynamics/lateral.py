@@ -145,7 +145,12 @@ def solve_step(arrays, is_whole, values):
 def right_side(arrays, h):
     """Set the right-hand side with what the increments do not change: the clamp moves, the rest stays where it was."""
     switches, course, inverse = integers_1(arrays, SWITCH), floats_2(arrays, COURSES), floats_2(arrays, INVERSE)
-    known, rates, side, answer = floats_2(arrays, KNOWN), floats_2(arrays, RATES), floats_2(arrays, SIDES), floats_1(arrays, ANSWER)
+    known, rates, side, answer = (
+        floats_2(arrays, KNOWN),
+        floats_2(arrays, RATES),
+        floats_2(arrays, SIDES),
+        floats_1(arrays, ANSWER),
+    )
     beams, tissue, covered = floats_5(arrays, BEAM), floats_5(arrays, TISSUE_BLOCKS), floats_3(arrays, COVERED)
     load, start, n = floats_2(arrays, PATH_LOAD), floats_3(arrays, LATERAL)[0], known.shape[1]
     side[:, :] = 0.0
@@ -156,7 +161,11 @@ def right_side(arrays, h):
         add_bending(course[s], beam, switches, known[s], side[s])
         add_mistakes(floats_4(arrays, PRINTED_ERRORS)[s], switches, known[s], rates[s], side[s])
         add_point_forces(
-            switches[GUIDES], floats_3(arrays, POINT_ROWS)[s], integers_2(arrays, POINT_FIRST)[s], floats_2(arrays, FORCES)[s], side[s]
+            switches[GUIDES],
+            floats_3(arrays, POINT_ROWS)[s],
+            integers_2(arrays, POINT_FIRST)[s],
+            floats_2(arrays, FORCES)[s],
+            side[s],
         )
         if switches[CUTS]:
             for i in range(n):

@@ -256,7 +256,9 @@ def book_step(arrays, h, is_last, is_shown):
     for at in (0, 1, END, START):
         moves = moves or course[at, SPEED] != 0.0 or course[at, ACCELERATION] != 0.0
     starts = axial[LANDED] == KINK or abs(axial[LAST_LENGTH] - h) > 1e-9 * h
-    corrects = switches[INERTIA] != 0 and moves and (is_last or starts or is_pushed)  # any step of a push may turn out to be the last
+    corrects = (
+        switches[INERTIA] != 0 and moves and (is_last or starts or is_pushed)
+    )  # any step of a push may turn out to be the last
     if not is_pushed and (corrects or is_shown or not switches[INERTIA]):
         for s in range(2):
             set_sums(arrays, s, corrects)

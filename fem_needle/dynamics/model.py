@@ -124,7 +124,8 @@ def numbers_of(plant: Plant) -> Array:
 
 def layer_rows(scene: Scene) -> Array:
     rows = [
-        (layer.start, layer.far_side, layer.foundation_modulus, layer.damping, layer.cutting_force) for layer in scene.tissue.layers
+        (layer.start, layer.far_side, layer.foundation_modulus, layer.damping, layer.cutting_force)
+        for layer in scene.tissue.layers
     ]
     return np.array(rows, dtype=float).reshape(-1, 5)
 

@@ -233,7 +233,10 @@ class Push:
     def _shown(self, samples: Samples) -> Samples:
         """Return the sample of an event as the state says: at its very depth, at rest where it has stopped."""
         last, speed, force = len(samples) - 1, self.speed, self._driving
-        changes = {name: np.array(getattr(samples, name)) for name in ("depth", "speed", "friction_force", "axial_kinetic_energy", "arrest_loss", "boundary_energy")}
+        changes = {
+            name: np.array(getattr(samples, name))
+            for name in ("depth", "speed", "friction_force", "axial_kinetic_energy", "arrest_loss", "boundary_energy")
+        }
         changes["depth"][last], changes["speed"][last] = self.depth, speed
         changes["arrest_loss"][last] = self.needle.live.ledger[at.ARREST_LOSS]
         if speed == 0.0:
@@ -244,7 +247,9 @@ class Push:
         """Return the state after one step to a time, None where it cannot be taken; the needle's own state stays."""
         self.needle.restore(before)
         self._set_limits(direction, level, events=False)
-        status, _ = self.needle.advance(np.array([[float(self.needle.axial_of(before)[at.NOW]), until, 1.0, 0.0]]), counted=self.counted)
+        status, _ = self.needle.advance(
+            np.array([[float(self.needle.axial_of(before)[at.NOW]), until, 1.0, 0.0]]), counted=self.counted
+        )
         after = self.needle.state() if status == at.DONE else None
         self.needle.restore(before)
         return after
@@ -325,4 +330,3 @@ def _between(low: float, high: float, low_value: float, high_value: float) -> fl
     """Return where the line between two values crosses zero, kept inside; the middle where a value is missing."""
     share = low_value / (low_value - high_value) if isfinite(low_value) and isfinite(high_value) else 0.5
     return low + (high - low) * min(max(share, 0.05), 0.95)
-

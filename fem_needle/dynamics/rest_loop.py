@@ -13,7 +13,8 @@ from fem_needle.dynamics.compilation import entrance, inner
 from fem_needle.dynamics.forces import add_point_forces, add_tissue_forces
 from fem_needle.dynamics.guides import guide_columns, guide_system, hold_guides
 from fem_needle.dynamics.instant import beam_at, prepare_matrices, prepare_points, set_loads, set_motion, set_place
-from fem_needle.dynamics.jumps import clamp_jumps, drop, force_jump_works
+from fem_needle.dynamics.jump_works import force_jump_works
+from fem_needle.dynamics.jumps import clamp_jumps, drop
 from fem_needle.dynamics.names import (
     ANSWER,
     ANSWERS,
@@ -144,7 +145,11 @@ def hold_rest(arrays, at, side):
     """Add the guides' forces at an instant to an answer."""
     switches, columns, answers = integers_1(arrays, SWITCH), floats_2(arrays, COLUMNS), floats_2(arrays, ANSWERS)
     rows, first = floats_3(arrays, POINT_ROWS)[at : at + 1], integers_2(arrays, POINT_FIRST)[at : at + 1]
-    flexible, forces, gaps = floats_3(arrays, FLEXIBLE)[at : at + 1], floats_2(arrays, FORCES)[at : at + 1], floats_1(arrays, GAPS)
+    flexible, forces, gaps = (
+        floats_3(arrays, FLEXIBLE)[at : at + 1],
+        floats_2(arrays, FORCES)[at : at + 1],
+        floats_1(arrays, GAPS),
+    )
     guide_columns(1, switches, rows, first, columns)
     for number in range(switches[GUIDES]):
         for i in range(columns.shape[1]):

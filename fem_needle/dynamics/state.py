@@ -47,9 +47,7 @@ class LiveState:
         parts = np.split(self.values, np.cumsum(sizes)[:-1])
         self.lateral = parts[0].reshape(PLANES, 2, size)
         self.axial, self.ledger, self.held, self.twist = parts[1:]
-        for name, array in zip(
-            (at.LATERAL, at.AXIAL_STATE, at.LEDGER_STATE, at.HELD), (self.lateral, *parts[1:4]), strict=True
-        ):
+        for name, array in zip((at.LATERAL, at.AXIAL_STATE, at.LEDGER_STATE, at.HELD), (self.lateral, *parts[1:4]), strict=True):
             work.put(name, array)
         self.count = np.zeros(1, dtype=np.int64)
         work.put(at.PATH_COUNT, self.count)
@@ -86,7 +84,9 @@ class LiveState:
         if not count:
             return State(self.values.copy(), (self.path[0][:1].copy(),), 0)
         lengths = (count + 1, count, 2 * count, count + 1)
-        return State(self.values.copy(), tuple(array[:length].copy() for array, length in zip(self.path, lengths, strict=True)), count)
+        return State(
+            self.values.copy(), tuple(array[:length].copy() for array, length in zip(self.path, lengths, strict=True)), count
+        )
 
     def restore(self, state: State) -> None:
         """Go back to a copy."""

@@ -145,7 +145,9 @@ def vibration_samples(vibration: Vibration, times: Array) -> Samples:
         bending = operators.beam.bending_forms(coordinates.T)
     kinks = float(start.forces @ points.flexibility @ start.forces)
     needed = _products(operators.mass, accelerations) + bent + held - points.rows.T @ start.forces
-    axial_forces = np.array([_axial_force(vibration, *state) for state in zip(coordinates, velocities, accelerations, strict=True)])
+    axial_forces = np.array(
+        [_axial_force(vibration, *state) for state in zip(coordinates, velocities, accelerations, strict=True)]
+    )
     hub = _clamp(plant, needed, stage.instant.depth)
     moved = (coordinates - start.coordinates) @ points.rows.T
     none = np.zeros(count)
