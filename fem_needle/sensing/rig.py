@@ -4,18 +4,39 @@ from __future__ import annotations
 
 from collections import deque
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.scene import Scene, Sensor
 from fem_needle.sensing.instruments import Instrument, Readings, instrument_of
-from fem_needle.sensing.noise import Noise, uniform
+from fem_needle.sensing.noise import Noise, Place, uniform
 from fem_needle.sensing.truth import Truth
 
 Array = NDArray[np.float64]
 
 EARLY = 1e-9  # of a sensor's period: instants closer than this are one
+
+
+class ChannelState(NamedTuple):
+    """Everything that one sensor remembers: places in its random numbers, its last frame, its clock, what is on its way."""
+
+    noise: Place
+    losses: Place
+    memory: Array | None
+    readings: int
+    due: float
+    earliest: float
+    under_way: tuple[tuple[float, Readings], ...]
+
+
+class RigState(NamedTuple):
+    """Everything that the sensors of a run remember: of each of them, what is known, and when the next reading is due [s]."""
+
+    channels: tuple[ChannelState, ...]
+    known: Readings
+    next_time: float
 
 
 class SensorRig:
@@ -90,13 +111,24 @@ class SensorRig:
                 self._known.update(under_way.popleft()[1])
         return self._known.copy()
 
+    def state(self) -> RigState:
+        """Return a copy of everything that is remembered."""
+        return RigState(tuple(channel.state() for channel in self._channels), self._known.copy(), self.next_time)
+
+    def restore(self, state: RigState) -> None:
+        """Go back to a state of this rig, or of another one of the same sensors."""
+        for channel, kept in zip(self._channels, state.channels, strict=True):
+            channel.restore(kept)
+        self._known, self.next_time = state.known.copy(), state.next_time
+
 
 class _Channel:
     """One sensor under way: its clock, its losses, and the readings that have not arrived yet."""
 
     def __init__(self, sensor: Sensor, length: float, source: np.random.SeedSequence) -> None:
         noise_source, loss_source = source.spawn(2)
-        self._read: Instrument = instrument_of(sensor, length, Noise.of(sensor.noise, noise_source))
+        self._noise = Noise.of(sensor.noise, noise_source)
+        self._read: Instrument = instrument_of(sensor, length, self._noise)
         self._lost, self._losses = sensor.dropped_fraction, uniform(loss_source)
         self._period, self._count = sensor.period, 0
         self.delay, self.slack = sensor.delay, EARLY * sensor.period
@@ -109,6 +141,18 @@ class _Channel:
             self._count += 1
             self.due = self._count * self._period
             self.earliest = self.due - self.slack
-        if self._lost and next(self._losses) < self._lost:
+        if self._lost and self._losses.next() < self._lost:
             return None
         return self._read(truth)
+
+    def state(self) -> ChannelState:
+        """Return a copy of everything that is remembered; readings themselves nobody changes."""
+        places = self._noise.stream.place(), self._losses.place()
+        return ChannelState(*places, self._read.memory, self._count, self.due, self.earliest, tuple(self.under_way))
+
+    def restore(self, state: ChannelState) -> None:
+        """Go back to a state."""
+        self._noise.stream.go_to(state.noise)
+        self._losses.go_to(state.losses)
+        self._read.memory, self._count, self.due, self.earliest = state[2:6]
+        self.under_way = deque(state.under_way)
