@@ -15,6 +15,7 @@ _HOMES = {
     "simulate": "fem_needle.simulation",
     "Simulation": "fem_needle.closed_loop.simulation",
     "UnstableLoopError": "fem_needle.closed_loop.simulation",
+    "SimulationBatch": "fem_needle.closed_loop.simulation_batch",
     "steer": "fem_needle.closed_loop.steering",
     "controller_of": "fem_needle.control.build",
     "simulate_many": "fem_needle.batch.many",

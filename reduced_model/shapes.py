@@ -111,6 +111,10 @@ class LineShapes:
         breaks = np.unique(np.concatenate([[0.0, self.span], *(part.breaks for part in self.sets)]))
         object.__setattr__(self, "breaks", _without_slivers(breaks[(breaks >= 0) & (breaks <= self.span)]))
 
+    def __reduce__(self) -> tuple[type[LineShapes], tuple[float, tuple[FunctionSet, ...], float]]:
+        """Return how they are made again: values that are kept stay behind."""
+        return LineShapes, (self.span, self.sets, self.offset)
+
     @property
     def size(self) -> int:
         """Number of functions."""

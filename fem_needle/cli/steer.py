@@ -29,7 +29,8 @@ Sensors = Annotated[
     list[str] | None,
     typer.Option("--sensor", metavar="KIND[:KEY=VALUE,...]", help="Change a sensor, or add one; may be repeated."),
 ]
-NO_ENERGIES = "Compute no works and no energy balance: decisions are then many times quicker in most loops."
+NO_ENERGIES = "Does nothing any more: works and the energy balance cost next to nothing."
+NOTHING_TO_LEAVE_OUT = "warning: --no-energies does nothing any more: works and the energy balance are always computed"
 REPEAT = "Run it N times with other scatter and noise; leaves a study in runs/<name>-steer."
 
 
@@ -76,10 +77,12 @@ def steer(
     loaded = steered(load_scene(scene), assignments or (), options, controller, sensor or ())
     folder = out or RUNS / (Path(scene).stem if repeat is None else f"{Path(scene).stem}-{NAME}")
     target = RunTarget(folder, force, numbered=out is None, for_study=repeat is not None)
+    if no_energies:
+        typer.echo(NOTHING_TO_LEAVE_OUT, err=True)
     if repeat is None:
-        _steer(loaded, target, energies=not no_energies, vtk=not no_vtk, quiet=as_json)
+        _steer(loaded, target, vtk=not no_vtk, quiet=as_json)
     else:
-        _repeat(loaded, repeat, target, energies=not no_energies, quiet=as_json)
+        _repeat(loaded, repeat, target, quiet=as_json)
     if explain:
         _explain(to_stderr=as_json)
 
@@ -90,7 +93,7 @@ def _explain(*, to_stderr: bool) -> None:
     explain_rows(EXPLANATION, to_stderr=to_stderr)
 
 
-def _steer(scene: Scene, target: RunTarget, *, energies: bool, vtk: bool, quiet: bool) -> None:
+def _steer(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool) -> None:
     """Compute, write and show a loop."""
     from fem_needle.cli.run_progress import ProgressBar
     from fem_needle.cli.steer_table import steer_rows
@@ -103,14 +106,14 @@ def _steer(scene: Scene, target: RunTarget, *, energies: bool, vtk: bool, quiet:
     writer = RunFolderWriter(target, vtk=vtk, warnings=messages, others={PICTURE: steer_picture})
     bar = ProgressBar(scene.title)
     progress = (lambda share: None) if quiet else bar.progress
-    run = finished(lambda: compute(scene, energies=energies, progress=progress), writer, bar, quiet=quiet)
+    run = finished(lambda: compute(scene, progress=progress), writer, bar, quiet=quiet)
     if quiet:
         print_json(run.summary)
     else:
         show_rows(scene.title, steer_rows(run, shown_folder(writer), messages))
 
 
-def _repeat(scene: Scene, repetitions: int, target: RunTarget, *, energies: bool, quiet: bool) -> None:
+def _repeat(scene: Scene, repetitions: int, target: RunTarget, *, quiet: bool) -> None:
     """Compute, write and show many runs of a loop."""
     from fem_needle.cli.run_progress import ProgressBar
     from fem_needle.cli.short_path import short_path
@@ -127,7 +130,7 @@ def _repeat(scene: Scene, repetitions: int, target: RunTarget, *, energies: bool
     warned(scene)
     bar = ProgressBar(scene.title)
     try:
-        study = compute(scene, repetitions, energies=energies, progress=None if quiet else bar.progress)
+        study = compute(scene, repetitions, progress=None if quiet else bar.progress)
     finally:
         bar.stop()
     plain = study.to_dict()

@@ -27,7 +27,7 @@ _OF_A_LOOP = (
     ("sensors", "--sensor changes one or adds one."),
     (
         "energy residual",
-        "largest gap in the balance of lateral energy and works, each term computed for itself; --no-energies leaves it out.",
+        "largest gap in the balance of lateral energy and works, each term computed for itself.",
     ),
     (
         "error estimate",

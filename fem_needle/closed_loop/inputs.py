@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 from fem_needle.control.signals import actuator_rate, limited, own_value
 from fem_needle.errors import SceneError
-from fem_needle.plant import Plant
 from fem_needle.scene import LateralLoad, Scene, Table, TipLoad
 from fem_needle.scene.cross_checks import input_obstacle
 from fem_needle.scene.time_quantity import TimeValue
@@ -55,17 +54,6 @@ class Ramp(NamedTuple):
         return Table(time=(self.time, self.arrival), value=(self.start, self.target))
 
 
-class Driven:
-    """A plant in a scene whose inputs are commanded; everything else is the plant's own."""
-
-    def __init__(self, plant: Plant, scene: Scene) -> None:
-        self._plant = plant
-        self.scene = scene
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._plant, name)
-
-
 class Inputs(NamedTuple):
     """The inputs of a scene that were commanded; the others are the scene's own.
 
@@ -109,14 +97,17 @@ class Inputs(NamedTuple):
         """Return what the scene itself says of an input [SI] at a time [s]."""
         return own_value(self.scene, name, time)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how it is made again: from a plain dictionary."""
+        return Inputs, (self.scene, dict(self.ramps))
+
     def next_kink(self, time: float) -> float:
         """Return when the next ramp after a time arrives [s]; infinity where none is under way."""
-        return min((ramp.arrival for ramp in self.ramps.values() if ramp.arrival > time), default=inf)
-
-    def driven_scene(self, time: float) -> Scene:
-        """Return the scene with its inputs as they are from a time on, until the next kink; a speed is left as it was."""
-        functions = {name: ramp.function(time) for name, ramp in self.ramps.items()}
-        return with_inputs(self.scene, functions)
+        found = inf
+        for ramp in self.ramps.values():
+            if time < ramp.arrival < found:
+                found = ramp.arrival
+        return found
 
 
 def _check_input(scene: Scene, name: str) -> None:
@@ -139,4 +130,3 @@ def with_inputs(scene: Scene, functions: Mapping[str, TimeValue]) -> Scene:
             changed.append(load.model_copy(update={key: functions[name]}) if name in functions else load)
         changes["loads"] = tuple(changed)
     return scene.model_copy(update=changes)
-

@@ -77,6 +77,16 @@ class Effort(NamedTuple):
         return Effort(self.integral + magnitude_integral(ramp, start, end), largest)
 
 
+class AccountState(NamedTuple):
+    """What an account remembers: efforts, arrival, where the tip was last, until when efforts are counted [s], `awaits`."""
+
+    efforts: dict[str, Effort]
+    arrival: Arrival
+    last: tuple[float, float, float]
+    closed: float
+    awaits: float
+
+
 class Account:
     """Arrival and efforts of a run under way; what is asked at every decision is kept cheap.
 
@@ -115,6 +125,15 @@ class Account:
         arrival = Arrival(*self._last, no_target) if self.awaits or no_target else self._arrival
         return arrival, dict(self._efforts)
 
+    def state(self) -> AccountState:
+        """Return a copy of everything that is remembered."""
+        return AccountState(self._efforts.copy(), self._arrival, self._last, self._closed, self.awaits)
+
+    def restore(self, state: AccountState) -> None:
+        """Go back to a state."""
+        efforts, self._arrival, self._last, self._closed, self.awaits = state
+        self._efforts = efforts.copy()
+
 
 def magnitude_integral(ramp: Ramp, start: float, end: float) -> float:
     """Return the integral of the magnitude of an input over time, exactly."""
@@ -122,9 +141,7 @@ def magnitude_integral(ramp: Ramp, start: float, end: float) -> float:
     zero = ramp.time - ramp.start / slope if slope else inf
     marks = [start, *sorted(mark for mark in (zero, ramp.arrival) if start < mark < end), end]
     values = [abs(ramp.value(mark)) for mark in marks]
-    return sum(
-        0.5 * (values[index] + values[index + 1]) * (marks[index + 1] - marks[index]) for index in range(len(marks) - 1)
-    )
+    return sum(0.5 * (values[index] + values[index + 1]) * (marks[index + 1] - marks[index]) for index in range(len(marks) - 1))
 
 
 def outcome(scene: Scene, arrival: Arrival, efforts: Mapping[str, Effort]) -> dict[str, Any]:

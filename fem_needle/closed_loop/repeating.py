@@ -14,6 +14,7 @@ from itertools import islice
 from multiprocessing import get_context
 from time import perf_counter
 
+from fem_needle.closed_loop.ledger_option import warn_of_energies
 from fem_needle.closed_loop.repeated import RepeatedLoop, Repetition
 from fem_needle.closed_loop.repetitions import drawn
 from fem_needle.closed_loop.steering import steer
@@ -33,7 +34,7 @@ def repeat(
     repetitions: int,
     *,
     processes: int | None = None,
-    energies: bool = True,
+    energies: bool | None = None,
     progress: Progress | None = None,
 ) -> RepeatedLoop:
     """Steer a scene again and again, with other scatter and other noise each time.
@@ -64,12 +65,13 @@ def repeat(
     ComputationError
         If a process dies.
     """
+    warn_of_energies(energies, stacklevel=3)
     if repetitions < 1:
         raise SceneError(f"repetitions: too few (got {repetitions}; allowed 1 or more)")
     found: dict[int, Repetition] = {}
     mistakes: dict[int, Mistakes] = {}
     try:
-        for one, wrong in _all(partial(one_repetition, scene, energies), repetitions, processes, progress or _nobody):
+        for one, wrong in _all(partial(one_repetition, scene), repetitions, processes, progress or _nobody):
             found[one.number], mistakes[one.number] = one, wrong
     except KeyboardInterrupt:
         pass  # what was computed is told
@@ -107,10 +109,10 @@ def _tell_share(progress: Progress, number: int, repetitions: int, share: float)
     progress((number - 1 + share) / repetitions)
 
 
-def one_repetition(scene: Scene, energies: bool, number: int, progress: Progress = _nobody) -> Answer:
+def one_repetition(scene: Scene, number: int, progress: Progress = _nobody) -> Answer:
     """Return a repetition, whatever becomes of it, and what is wrong with its scene."""
     try:
-        return _row(scene, number, steer(scene, repetition=number, energies=energies, progress=progress)), ()
+        return _row(scene, number, steer(scene, repetition=number, progress=progress)), ()
     except KeyboardInterrupt:
         return Repetition(number, drawn(scene, number), {"stop_reason": "interrupted"}), ()
     except NeedleError as error:

@@ -13,19 +13,19 @@ import numpy as np
 from fem_needle.choices import first_time_step
 from fem_needle.closed_loop.fully_actuated import fully_actuated
 from fem_needle.closed_loop.inputs import with_inputs
+from fem_needle.closed_loop.ledger_option import warn_of_energies
 from fem_needle.closed_loop.repetitions import scattered
 from fem_needle.closed_loop.simulation import Simulation, analysis_of, output_step_of
 from fem_needle.control.build import controller_of
 from fem_needle.control.controller import Controller
+from fem_needle.dynamics.run import integration_of
 from fem_needle.errors import ComputationError, SuspiciousValueWarning
 from fem_needle.limits import check_readings, check_samples
 from fem_needle.models import build_plant, model_family
 from fem_needle.motion import run_duration
 from fem_needle.plant import Plant
-from fem_needle.run_job import time_stepper
 from fem_needle.scene import Controller as ControllerSettings
 from fem_needle.scene import Scene
-from fem_needle.steppers import StaticStepper
 from fem_needle.threads import one_thread
 from fem_needle.trajectory import Trajectory
 
@@ -71,22 +71,20 @@ class Loop:
     repetition: int = 0
     progress: Progress = _nobody
 
-    def simulated(self, time_step: float, log: Log | None = None, *, energies: bool) -> tuple[Simulation, Log]:
+    def simulated(self, time_step: float, log: Log | None = None) -> tuple[Simulation, Log]:
         """Return the run with steps of at most ``time_step`` [s], and what was commanded when; interrupted, as far as it got.
 
         Parameters
         ----------
         log
             Commands of another run, in place of the controller's.
-        energies
-            Whether works and the energy balance are wanted.
 
         Raises
         ------
         ComputationError
             If a step fails, the controller cannot go on, or the loop is unstable; with ``partial``, the trajectory so far.
         """
-        simulation = Simulation(self.plant, time_step=time_step, repetition=self.repetition, energies=energies)
+        simulation = Simulation(self.plant, time_step=time_step, repetition=self.repetition)
         done, duration = Log(), run_duration(self.plant.scene)
         try:
             for until, command in self._decisions(simulation) if log is None else log:
@@ -124,7 +122,7 @@ def steer(
     controller: Controller[Any] | None = None,
     plant: Plant | None = None,
     repetition: int = 0,
-    energies: bool = True,
+    energies: bool | None = None,
     progress: Progress = _nobody,
 ) -> Trajectory:
     """Steer a needle as ``fem-needle steer`` does.
@@ -141,7 +139,7 @@ def steer(
     repetition
         0 is the scene as it is; from 1 on, ``[scatter]`` makes each run different.
     energies
-        Whether works and the energy balance shall be computed; without them (nan) most loops are many times faster.
+        Does nothing any more: works and the energy balance are always computed.
     progress
         Is told which share of a run is done, 0 to 1; from 0 again where it is computed with finer steps.
 
@@ -163,6 +161,7 @@ def steer(
     Where ``numerics.time_step`` is "auto", the commands of a run are replayed with steps of half the length until the tip agrees
     within the tolerance: what is compared is the integration, not decisions that a threshold turns round.
     """
+    warn_of_energies(energies)
     _check_readings(scene)
     if controller is None:
         controller = controller_of(scene)
@@ -171,7 +170,7 @@ def steer(
         return fully_actuated(needle)
     for message in needle.warnings:
         warnings.warn(message, SuspiciousValueWarning, stacklevel=3)
-    return _refined(Loop(needle, controller, scene.controller.period, repetition, progress), energies=energies)
+    return _refined(Loop(needle, controller, scene.controller.period, repetition, progress))
 
 
 def _check_readings(scene: Scene) -> None:
@@ -197,19 +196,19 @@ def chosen_plant(scene: Scene) -> Plant:
     return build_plant(scene.with_value("numerics.elements", int(elements)))
 
 
-def _refined(loop: Loop, *, energies: bool) -> Trajectory:
-    """Run with the scene's step, or with steps that the tolerance needs; trial runs compute no works where that is quicker."""
+def _refined(loop: Loop) -> Trajectory:
+    """Run with the scene's step, or with steps that the tolerance needs."""
     scene = loop.plant.scene
     analysis, given, tolerance = analysis_of(scene), scene.numerics.time_step, scene.numerics.tolerance
     if isinstance(given, float):
-        return loop.simulated(given, energies=energies)[0].trajectory()
+        return loop.simulated(given)[0].trajectory()
     step = min(first_time_step(loop.plant, analysis, output_step_of(scene)), loop.period)
-    if isinstance(time_stepper(loop.plant, scene, analysis), StaticStepper):
-        return loop.simulated(step, energies=energies)[0].trajectory()
+    if not integration_of(loop.plant, scene, analysis).steps:
+        return loop.simulated(step)[0].trajectory()
     error, missed = inf, list[str]()
     for _ in range(MOST_REFINEMENTS):
-        simulation, log = loop.simulated(step, energies=False)
-        finer, _ = loop.simulated(step / 2, log, energies=False)
+        simulation, log = loop.simulated(step)
+        finer, _ = loop.simulated(step / 2, log)
         if "interrupted" in {simulation.stop_reason, finer.stop_reason}:
             return simulation.trajectory("interrupted")
         error = tip_difference(simulation, finer)
@@ -219,8 +218,6 @@ def _refined(loop: Loop, *, energies: bool) -> Trajectory:
         step *= max(0.1, min(0.5, 0.8 * (tolerance / error) ** (1 / 3)))
     else:
         missed.append(f"the tolerance {tolerance:g} was not reached with steps of {step:g} s: see error_estimate")
-    if energies and not simulation.has_works:
-        simulation, _ = loop.simulated(step, energies=True)
     run = simulation.trajectory()
     run.summary["error_estimate"] = error
     run.summary["warnings"] = [*run.summary["warnings"], *missed]

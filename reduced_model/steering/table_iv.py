@@ -184,7 +184,7 @@ def _decay(found: Sequence[Row]) -> str:
 def largest_deformation(decay_length: float) -> float:
     """Return the largest reading of the tissue's deformation [m] in the incremental loop at 10 mm/s."""
     scene = scene_of(10.0).with_values({"sensors.1.decay_length": decay_length, "numerics.output_step": 0.15})
-    return float(np.nanmax(steer(scene, energies=False).signals["measurement_tissue_deformation"]))
+    return float(np.nanmax(steer(scene).signals["measurement_tissue_deformation"]))
 
 
 def _constant_speeds(found: Sequence[Row]) -> list[Row]:

@@ -14,7 +14,6 @@ LATE_IMPORTS = {
     ("fem_needle.trajectory", "save"),
     ("fem_needle.trajectory", "load"),
     ("fem_needle.loops", "run_loop"),
-    ("fem_needle.closed_loop.lean", "lean_engine"),
     ("fem_needle.batch.many", "prepared"),
     ("fem_needle.view.picture", "_rendered"),  # VTK, in the process that draws
 }

@@ -24,9 +24,11 @@ from fem_needle import (
 from fem_needle.banded import SingularMatrixError
 from fem_needle.batch import many
 from fem_needle.benchmark import goal_measurements, goals
-from fem_needle.closed_loop import compiled_engine, repeating
+from fem_needle.closed_loop import repeating
+from fem_needle.closed_loop.kernel import LoopEngine
 from fem_needle.closed_loop.simulation import Simulation
 from fem_needle.comparison.runs import shape_at
+from fem_needle.dynamics.names import FAILED
 from fem_needle.identification import sample_tips
 from fem_needle.march import started
 from fem_needle.motion import depth_law
@@ -107,9 +109,9 @@ def test_a_step_to_what_is_no_number_says_where(monkeypatch):
 def test_a_compiled_loop_without_a_finite_answer_says_where(monkeypatch):
     loads = [TipLoad(force=0.1), LateralLoad(position=-0.005, force=0.1)]
     plant = FiniteElementNeedle(scene_of("hub", moving(0.5, 0.04, 0.05), loads=loads, duration=0.02), elements=2)
-    loop = Simulation(plant, time_step=1e-3, analysis="dynamic", output_step=0.01, energies=False)
-    monkeypatch.setattr(compiled_engine, "run_steps", lambda begin, stop, *given: begin)
-    with pytest.raises(ComputationError, match=r"time 0 s, depth 0\.04 m failed: the equations have no finite answer"):
+    loop = Simulation(plant, time_step=1e-3, analysis="dynamic", output_step=0.01)
+    monkeypatch.setattr(LoopEngine, "go", lambda *given: FAILED)
+    with pytest.raises(ComputationError, match=r"time 0 s, depth 0\.04 m failed: the deflection is not finite"):
         loop.step({"lateral_force": 0.2}, 5e-3)
 
 

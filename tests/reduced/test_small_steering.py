@@ -20,7 +20,7 @@ SPREAD = np.linspace(-0.05, 0.05, 10)  # of the means, over the repetitions
 def invented(means):
     """Loops that end with the given mean errors [pixels], by controller and speed [mm/s]."""
 
-    def steer(scene, repetition=1, energies=True):
+    def steer(scene, repetition=1):
         speed = scene.insertion.speed
         speed = round(1e3 * speed) if isinstance(speed, float) else 0.0  # a hand trembles
         mean = means.get((scene.controller.kind, speed), 3.0)

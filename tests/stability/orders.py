@@ -171,13 +171,13 @@ def loop_reference(model, case):
     return np.array([whole.tip(state, whole.law.depth(DURATION), DURATION)])
 
 
-def looped(model, case, *, energies, push=False):
+def looped(model, case, *, push=False):
     """Errors and numbers of steps of a commanded needle."""
     name = "push_force" if push else "lateral_force"
     scene = pushed_scene(model, case, 3.0) if push else scene_for(model, case)
     plant, true, errors, counts = model.plant(scene), loop_reference(model, "push" if push else case), [], []
     for step in STEPS[:3] if push else STEPS:
-        loop = Simulation(plant, time_step=step, analysis="dynamic", output_step=DURATION, energies=energies)
+        loop = Simulation(plant, time_step=step, analysis="dynamic", output_step=DURATION)
         for value in COMMANDS[name]:
             loop.step({name: value}, DURATION / 4.0)
         found = np.array([loop.depth - 0.1, loop.tip_deflection] if push else [loop.tip_deflection])
@@ -281,10 +281,9 @@ def rows():
         *((f"creep (Radau), {name}", 3, every(stepped, model, creeping=True, **numpy)) for name, model in ENTRY.items()),
         ("creep (Radau), compiled, elements, entry", 3, every(stepped, ELEMENTS, creeping=True, **compiled)),
         *((f"push: depth and tip, {name}", 4, only(pushed, model, cases=inward)) for name, model in NAMED.items()),
-        ("commanded force, elements, hub", 4, only(looped, HUB, cases=CASES[1::2], energies=True)),
-        ("commanded force, modes, hub", 4, only(looped, HUB_MODES, cases=CASES[1::2], energies=True)),
-        ("commanded force, compiled, elements, hub", 4, only(looped, HUB, cases=CASES[1::2], energies=False)),
-        ("commanded push, elements, hub", 4, only(looped, HUB, cases=CASES[3:], energies=True, push=True)),
+        ("commanded force, elements, hub", 4, only(looped, HUB, cases=CASES[1::2])),
+        ("commanded force, modes, hub", 4, only(looped, HUB_MODES, cases=CASES[1::2])),
+        ("commanded push, elements, hub", 4, only(looped, HUB, cases=CASES[3:], push=True)),
         ("loop over many runs, vibrations", 4, only(batch, cases=(CASES[0], *inward))),
         *((f"cut path (Radau), {name}", 2, only(cut, model, cases=inward)) for name, model in ENTRY.items()),
     ]

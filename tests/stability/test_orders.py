@@ -11,7 +11,7 @@ DOCUMENT = Path(__file__).parents[2] / "docs" / "robustness.md"
 ROWS = {name: (order, cells) for name, order, cells in orders.rows()}
 QUICK = (
     "compiled loop, radius 1, elements, entry",
-    "commanded force, compiled, elements, hub",
+    "commanded force, elements, hub",
     "loop over many runs, vibrations",
 )
 

@@ -119,27 +119,19 @@ def test_json_is_the_summary_and_nothing_else(run):
     assert json.loads(out)["sensors"] == ["tip-imaging", "encoder"]
 
 
-def test_energies_can_be_left_out(run, scene):
-    status, out, _ = run("--no-energies", "--no-vtk")
-    assert status == 0
-    assert rows_of(out)["energy residual"] == ["not computed"]
-    loaded, expected = load_run(Path("runs/short")), steer(scene)
-    assert loaded.summary["relative_energy_residual"] is None
-    assert np.all(np.isnan(loaded.load_work))
-    assert np.all(np.isfinite(loaded.bending_energy))
-    largest = expected.summary["max_abs_tip_deflection"]
-    np.testing.assert_allclose(loaded.tip_deflection, expected.tip_deflection, atol=1e-4 * largest)  # gains of so few depths
-    commands = expected.command_lateral_force
-    np.testing.assert_allclose(loaded.command_lateral_force, commands, atol=1e-3 * np.max(np.abs(commands)))
-
-
-def test_repetitions_without_energies_are_those_of_steer(run, scene):
-    assert run("--repeat", "2", "--no-energies")[0] == 0
-    rows = json.loads(Path("runs/short-steer/steer.json").read_text(encoding="utf-8"))["rows"]
-    quick, whole = ([steer(scene, repetition=number, energies=energies) for number in (1, 2)] for energies in (False, True))
-    assert [row["target_error"] for row in rows] == [one.summary["target_error"] for one in quick]
-    assert [row["steps"] for row in rows] == [one.summary["steps"] for one in quick]
-    assert [row["target_error"] for row in rows] != [one.summary["target_error"] for one in whole]  # by the gains' interpolation
+@pytest.mark.parametrize("options", [("--no-vtk",), ("--repeat", "2")])
+def test_energies_are_always_there(run, options):
+    """The option of old is accepted, told to do nothing, and changes nothing."""
+    status, _, told = run("--no-energies", "--out", "asked", *options)
+    assert status == 0 and "--no-energies does nothing any more" in told
+    assert run("--out", "usual", *options)[0] == 0
+    name = "steer.json" if "--repeat" in options else "summary.json"
+    asked, usual = (json.loads(Path(folder, name).read_text(encoding="utf-8")) for folder in ("asked", "usual"))
+    for one in (asked, usual):
+        for row in one.get("rows", [one]):
+            for key in ("solve_time", "wall_time", "folder"):
+                row.pop(key, None)
+    assert asked == usual
 
 
 def test_another_controller_keeps_the_signals_and_drops_the_gains(scene):

@@ -56,16 +56,6 @@ def test_the_next_kink_is_the_next_arrival():
     assert Inputs(RATED).next_kink(0.0) == inf
 
 
-def test_the_scene_as_it_is_driven():
-    inputs = Inputs(RATED).commanded(1.0, {"lateral_force": 1.05, "hub_angle": 0.1, "tip_direction": -0.5})
-    driven = inputs.driven_scene(1.1)
-    assert driven.support.hub_angle == 0.1
-    assert (driven.loads[0].force, driven.loads[0].direction) == (0.1, -0.5)
-    assert list(driven.loads[1].force.values) == [0.05, 1.05]
-    assert inputs.driven_scene(1.25).loads[1].force == 1.05
-    assert RATED.loads[1].force == 0.05
-
-
 def test_what_the_scene_says_before_any_command():
     scene = loop_scene().with_value("loads.1.force", {"time": [0.0, 1.0], "value": [0.0, 2.0]})
     assert own_value(scene, "lateral_force", 0.25) == 0.5

@@ -55,7 +55,7 @@ NAMES = (*SOLVED, "loop", "one sample", "interrupted")
 def run_named(name: str) -> Trajectory:
     """Return one of `NAMES`."""
     if name == "loop":
-        return steer(load_scene("steering").with_values({"numerics.elements": 8, "numerics.output_step": 0.5}), energies=False)
+        return steer(load_scene("steering").with_values({"numerics.elements": 8, "numerics.output_step": 0.5}))
     if name == "one sample":
         return cut_off(run_named("hub"), 1)
     if name == "interrupted":

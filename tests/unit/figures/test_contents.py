@@ -187,8 +187,11 @@ def test_energies_are_the_ledger_and_name_what_is_zero():
     assert panel(energies(run_named("still")), "Stored").get_title(loc="left") == "Stored, lateral: zero throughout"
 
 
-def test_energies_that_a_loop_left_out_are_said_to_be_missing():
-    assert panel(energies(run_named("loop")), "Lateral works").get_title(loc="left") == "Lateral works: not computed"
+def test_energies_that_a_loop_of_old_left_out_are_said_to_be_missing():
+    loop = run_named("loop")
+    works = {name: np.full(len(loop.time), np.nan) for name in ("load_work", "hub_work", "tissue_work", "tissue_dissipation")}
+    missing = replace(loop, series=loop.series | works | {"boundary_energy": works["hub_work"]})
+    assert panel(energies(missing), "Lateral works").get_title(loc="left") == "Lateral works: not computed"
 
 
 def test_the_waterfall_is_the_deflection_over_arc_length_and_time():
