@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
-from importlib.util import find_spec
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,10 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from fem_needle.batch import columns as at
 from fem_needle.batch.rows import can_vary, depths_of, row_of, rows_of, times_of
 from fem_needle.batch.spectrum import Spectrum, is_uniform, spectrum_of
+from fem_needle.choices import choose
 from fem_needle.collocation import collocation
 from fem_needle.display import Card, Shown, in_millimeters
+from fem_needle.dynamics.grid import time_grid
+from fem_needle.dynamics.run import integration_of, run_samples
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.models import build_plant
+from fem_needle.sample_arrays import Samples, joined
 from fem_needle.scene import Scene
 from fem_needle.simulation import run_scene
 from fem_needle.threads import one_thread
@@ -94,9 +97,11 @@ def simulate_many(
         Scenes, or one scene whose values ``parameters`` vary.
     parameters
         Arrays of equal length by path, one value for each run: ``{"loads.0.force": forces, "insertion.speed": speeds}``.
-    time_step, vibrations
-        Largest step [s] and number of moving vibrations, where all runs have their own compiled loop; default: halved and
-        doubled until all runs agree to half the first scene's tolerance.
+    time_step
+        Largest step [s] of all runs; default: what each scene says, or what its tolerance needs.
+    vibrations
+        Number of moving vibrations of uniform runs; default: doubled, with halved steps, until all runs agree to half the first
+        scene's tolerance.
     cores
         How many to use; default: all.
     progress
@@ -115,33 +120,33 @@ def simulate_many(
     Notes
     -----
     Runs of the uniform kind (support ``entry``, one layer, constant speed, tip forces that are constant or a sinusoid) that share
-    needle length and model go through one compiled loop, without any Python for a run. All others, and all where numba is
-    missing, are run one by one (`run_scene`), in as many processes as there are cores.
+    needle length and model go through one compiled loop, without any Python for a run. All others are run one by one, in as many
+    threads as there are cores: as they are where a scene gives its mesh and its time step, as `run_scene` runs them where these
+    are to be chosen.
     """
     told = progress or _nobody
     workers = cores or os.cpu_count() or 1
     if isinstance(scenes, Scene):
         given = parameters or {}
-        if has_loop() and is_uniform(scenes) and can_vary(scenes, list(given)):
+        if is_uniform(scenes) and can_vary(scenes, list(given)):
             return _compiled(scenes, rows_of(scenes, given), time_step, vibrations, workers, told)
-        return _one_by_one(_varied(scenes, given), workers, told)
+        return _one_by_one(_stepped(_varied(scenes, given), time_step), workers, told)
     if parameters is not None:
         raise SceneError("parameters: vary one scene (got several; allowed one scene with parameters, or scenes alone)")
     many = list(scenes)
     if not many:
         raise SceneError("scenes: nothing to compute (got 0; allowed 1 or more)")
-    if has_loop() and all(is_uniform(scene) and _shares(scene, many[0]) for scene in many):
+    if all(is_uniform(scene) and _shares(scene, many[0]) for scene in many):
         return _compiled(many[0], np.array([row_of(scene) for scene in many]), time_step, vibrations, workers, told)
-    return _one_by_one(many, workers, told)
-
-
-def has_loop() -> bool:
-    """Return whether numba is there to compile the batch's loop."""
-    return find_spec("numba") is not None
+    return _one_by_one(_stepped(many, time_step), workers, told)
 
 
 def _nobody(fraction: float) -> None:
     """Tell nobody."""
+
+
+def _stepped(scenes: list[Scene], time_step: float | None) -> list[Scene]:
+    return scenes if time_step is None else [scene.with_value("numerics.time_step", time_step) for scene in scenes]
 
 
 def _shares(scene: Scene, first: Scene) -> bool:
@@ -215,9 +220,7 @@ def prepared(rows: Array, spectrum: Spectrum, time_step: float) -> Callable[[Arr
     return compute
 
 
-def _tips(
-    rows: Array, times: Array, spectrum: Spectrum, time_step: float, cores: int, progress: Progress
-) -> tuple[Array, int]:
+def _tips(rows: Array, times: Array, spectrum: Spectrum, time_step: float, cores: int, progress: Progress) -> tuple[Array, int]:
     """Return the tips (runs, outputs) and the number of steps: each core takes one piece of the runs after the other."""
     compute = prepared(rows, spectrum, time_step)
     tips = np.full(times.shape, np.nan)
@@ -235,21 +238,65 @@ def _tips(
 
 
 def _one_by_one(scenes: list[Scene], cores: int, progress: Progress) -> ManyRuns:
-    """Run every scene on its own."""
-    with ProcessPoolExecutor(min(cores, len(scenes))) as pool:
-        waiting = {pool.submit(_one, scene): number for number, scene in enumerate(scenes)}
-        found = {}
-        for finished in as_completed(waiting):
-            found[waiting[finished]] = finished.result()
-            progress(len(found) / len(scenes))
-    longest = max(len(time) for time, *_ in found.values())
-    columns = np.full((3, len(scenes), longest), np.nan)
-    for (number, run), part in product(found.items(), range(3)):
-        columns[part, number, : len(run[part])] = run[part]
-    estimate = float(np.max([np.nan if run[3] is None else run[3] for run in found.values()]))
-    return ManyRuns(columns[0], columns[1], columns[2], estimate, sum(run[4] for run in found.values()))
+    """Run every scene on its own, in threads, the first one before them: compiled code is there when they start."""
+    found = [_one(scenes[0])]
+    progress(1 / len(scenes))
+    with ThreadPoolExecutor(cores) as pool:
+        waiting = [pool.submit(_one, scene) for scene in scenes[1:]]
+        try:
+            for done, finished in enumerate(as_completed(waiting), start=2):
+                finished.result()
+                progress(done / len(scenes))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+        found.extend(run.result() for run in waiting)
+    columns = np.full((3, len(scenes), max(run.rows.shape[1] for run in found)), np.nan)
+    for number, run in enumerate(found):
+        columns[:, number, : run.rows.shape[1]] = run.rows
+    return ManyRuns(
+        columns[0], columns[1], columns[2], float(np.max([run.error for run in found])), sum(run.steps for run in found)
+    )
 
 
-def _one(scene: Scene) -> tuple[Array, Array, Array, float | None, int]:
+@dataclass(frozen=True, eq=False)
+class _Tips:
+    """One run: rows of time, depth and tip deflection (3, outputs), its error estimate and its steps."""
+
+    rows: Array
+    error: float
+    steps: int
+
+
+def _one(scene: Scene) -> _Tips:
+    if _is_given(scene):
+        return _straight(scene)
     run = run_scene(scene)
-    return run.time, run.depth, run.tip_deflection, run.summary["error_estimate"], int(run.summary["steps"])
+    estimate = run.summary["error_estimate"]
+    rows = np.stack([run.time, run.depth, run.tip_deflection])
+    return _Tips(rows, np.nan if estimate is None else estimate, int(run.summary["steps"]))
+
+
+def _is_given(scene: Scene) -> bool:
+    """Return whether neither mesh nor step is to be chosen."""
+    numerics = scene.numerics
+    has_mesh = scene.model.kind != "fem" or numerics.elements != "auto" or numerics.mesh is not None
+    return has_mesh and numerics.time_step != "auto"
+
+
+def _straight(scene: Scene) -> _Tips:
+    """Return the tips of a run whose settings are given, and nothing else."""
+    plant = build_plant(scene)
+    choice = choose(scene, lambda: plant)
+    grid = time_grid(plant, float(scene.numerics.time_step), choice.output_step)
+    running = run_samples(plant, integration_of(plant, scene, choice.analysis), grid)
+    blocks: list[Samples] = []
+    while True:
+        try:
+            blocks.append(next(running))
+        except StopIteration as finished:
+            end = finished.value
+            break
+    samples = joined(blocks)
+    tips = plant.deflection(samples.coordinates, samples.point_forces, samples.depth, np.array([scene.needle.length]))
+    return _Tips(np.stack([samples.time, samples.depth, tips[:, 0]]), np.nan, end.steps)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from fem_needle import SceneError, load_scene, run_scene, simulate_many
-from fem_needle.batch import many
 from fem_needle.exact import ReleaseFromTipForce
 from fem_needle.scene import Sinusoid, TipLoad
 from tests.consistency.scenes import BUZZ, LAYERS, held, moving, scene_of
@@ -118,14 +117,14 @@ def test_the_benchmark_of_a_swinging_force():
     assert np.max(np.abs(found.tip_deflection[0] - exact)) < 1e-3 * np.max(np.abs(exact))
 
 
-def test_without_numba_every_run_is_one_of_its_own(monkeypatch):
-    scene = SWINGING.with_values({"loads.0.force": 0.1, "run.duration": 0.02})
-    expected = simulate_many(scene)
-    monkeypatch.setattr(many, "find_spec", lambda name: None)
-    found = simulate_many(scene)
-    assert found.tip_deflection.shape == expected.tip_deflection.shape
-    scale = np.max(np.abs(expected.tip_deflection))
-    assert np.max(np.abs(found.tip_deflection - expected.tip_deflection)) < 2e-3 * scale
+@pytest.mark.parametrize("cores", [1, 3])
+def test_runs_with_given_settings_are_those_runs(cores):
+    scene = scene_of("hub", moving(1.0, 0.02, 0.06), LAYERS, (TipLoad(force=BUZZ),), duration=0.02)
+    scene = scene.with_values({"numerics.elements": 5, "numerics.analysis": "dynamic"})
+    found = simulate_many(scene, {"needle.bending_stiffness": [0.02, 0.03, 0.05]}, time_step=1e-4, cores=cores)
+    exact = [run_scene(scene.with_value("needle.bending_stiffness", b), time_step=1e-4) for b in (0.02, 0.03, 0.05)]
+    assert np.array_equal(found.tip_deflection, [run.tip_deflection for run in exact])
+    assert found.steps == sum(run.summary["steps"] for run in exact)
 
 
 def test_a_release_is_turned_from_output_to_output():
