@@ -1,6 +1,6 @@
 """The axial side: friction, cutting, and a push whose speed follows from the forces along the needle.
 
-Pi = rho A l v + dT/dv,   Pi' = push - friction - cutting + (A without - d(dT/dv)/dt)            at the nodes of the lateral method
+Pi = rho A l v + dT/dv,   Pi' = push - friction - cutting + (A without - d(dT/dv)/dt)    at the nodes of the lateral method
 """
 
 from __future__ import annotations

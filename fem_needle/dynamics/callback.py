@@ -63,4 +63,4 @@ def _asked(address: int, at: int, question: int) -> None:
     _KNOWN[int(address)](int(at), int(question))
 
 
-ask = _asked if config.DISABLE_JIT else intrinsic(_typed)  # type: ignore[attr-defined]
+ask: Any = _asked if config.DISABLE_JIT else intrinsic(_typed)  # type: ignore[attr-defined]

@@ -1,6 +1,6 @@
 """Which part of which piece of the needle lies in which layer, and the tissue's matrices that follow.
 
-    G = sum over layers k integral psi_i psi_j,  C the same with c,  D = integral c x^p psi_i psi_j',  E = integral c x^2p psi_i' psi_j'
+    G = sum over layers k integral psi_i psi_j,  C with c,  D = integral c x^p psi_i psi_j',  E = integral c x^2p psi_i' psi_j'
 
 over the part of the line that is in the layer. Whole pieces take their integrals; parts of pieces that an end cuts are
 integrated by Gauss's rule, exactly. This is the only place where a foundation modulus meets a shape.

@@ -1,8 +1,9 @@
 """The path that the tip has cut, as the rest line r(y) of the tissue's springs: cubic pieces, and sums of their moments.
 
-    H_i = sum over layers k integral r psi_i dy,   dH_i/dz = k r psi_i at the tip + integral k r psi_i' dx/dz dy,   c = 1/2 sum k integral r^2
+    H_i = sum over layers k integral r psi_i dy,  dH_i/dz = k r psi_i at the tip + integral k r psi_i' dx/dz dy,
+    c = 1/2 sum k integral r^2
 
-A piece of the line of shapes is a polynomial in y: with the moments of r about any place its integral is exact. Moments of 2, 4, 8, ...
+A piece of the line of shapes is a polynomial in y: with moments of r about any place its integral is exact. Moments of 2, 4, ...
 pieces together are kept (a binary tree), so that a path of n pieces costs log n.
 """
 
@@ -197,7 +198,7 @@ def add_rest(arrays, is_history, start, stop, cubic, course, load, load_rate):
         layer, k = layers[number], layers[number, MODULUS]
         if k == 0.0 or not course[SIDE] > layer[LAYER_START]:
             continue
-        low, high = max(layer[LAYER_START], start), min(min(layer[LAYER_END], stop), depth)
+        low, high = max(layer[LAYER_START], start), min(layer[LAYER_END], stop, depth)
         if high <= low:
             continue
         place = low + (length - depth) if frame == MATERIAL else (low / depth if frame == STRETCHED else low)
@@ -279,7 +280,7 @@ def rest_constant(course, count, edges, cubics, squares, layers):
         layer = layers[number]
         if count > 0 and layer[MODULUS] != 0.0 and course[SIDE] > layer[LAYER_START]:
             low = max(layer[LAYER_START], edges[0])
-            high = min(min(layer[LAYER_END], course[DEPTH]), edges[count])
+            high = min(layer[LAYER_END], course[DEPTH], edges[count])
             if high > low:
                 total += 0.5 * layer[MODULUS] * path_square(low, high, count, edges, cubics, squares)
     return total

@@ -63,9 +63,11 @@ class Engine:
     def __init__(self, plant: Plant, kind: str, method: Collocation | None = None) -> None:
         self.plant, self.kind = plant, kind
         self.method = gauss(3) if kind == REST or method is None else method
-        known = is_known(plant)
-        make = model_of if known else given_model
-        self.model = make(plant, inertia=kind == DYNAMIC, viscous=kind != REST)
+        inertia, viscous = kind == DYNAMIC, kind != REST
+        if is_known(plant):
+            self.model = model_of(plant, inertia=inertia, viscous=viscous)
+        else:
+            self.model = given_model(plant, inertia=inertia, viscous=viscous)
         if kind == REST:
             self.model.switches[at.CUTS] = 0
         self._work = Work(self.model, self.method, 1 if kind == REST else 2)
@@ -74,7 +76,7 @@ class Engine:
         self.live = LiveState(self._work, self.model.size, self.model.points, orders)
         self.cuts = bool(self.model.switches[at.CUTS])
         self._run = run_rests if kind == REST else run_steps
-        self._answers = None if known else Answers(plant, self._work)
+        self._answers = None if is_known(plant) else Answers(plant, self._work)
 
     def begin(self, start: StepEnd, depth: float) -> None:
         """Stand at t = 0 at a depth [m] with a state."""

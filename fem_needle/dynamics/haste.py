@@ -52,7 +52,8 @@ def _remembered() -> Iterator[None]:
     """Remember what an operator makes of which types: numba asks for that of every product anew, in a dozen places."""
     found: dict[tuple[int, tuple[Any, ...]], Any] = {}
     kept = []  # so that no other function gets the number of one that is gone
-    usual = types.Function.get_call_type
+    functions: Any = types.Function
+    is_own, usual = "get_call_type" in vars(functions), functions.get_call_type
 
     def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
         if kws:
@@ -63,12 +64,11 @@ def _remembered() -> Iterator[None]:
             found[key] = usual(self, context, args, kws)
         return found[key]
 
-    is_own = "get_call_type" in vars(types.Function)
-    types.Function.get_call_type = get_call_type
+    functions.get_call_type = get_call_type
     try:
         yield
     finally:
         if is_own:
-            types.Function.get_call_type = usual
+            functions.get_call_type = usual
         else:
-            del types.Function.get_call_type
+            del functions.get_call_type

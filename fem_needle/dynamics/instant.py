@@ -1,4 +1,4 @@
-"""An instant of a step: the insertion, the loads and the hub at its time, then everything of the needle that depends on the depth."""
+"""An instant of a step: the insertion, the loads and the hub at its time, then all of the needle that depends on the depth."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def prepare_points(arrays, at):
 
 @inner
 def beam_at(beam, at):
-    """Return which of the beam's matrices (*, B, 4, m, m) belong to an instant: the only ones, or, of a beam that grows, its own."""
+    """Return which of the beam's matrices (*, B, 4, m, m) belong to an instant: the only ones, or those of a grown beam."""
     return at if beam.shape[0] > 1 else 0
 
 

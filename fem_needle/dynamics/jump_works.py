@@ -78,7 +78,7 @@ def elastic_energy(arrays, right, left):
 
 @inner
 def force_jump_works(arrays, jumped):
-    """Add the works where the needle follows at once: mean force times jump of deflection; of a clamp that ``jumped``, what resists.
+    """Add the works where the needle follows at once: mean force times jump of deflection; of a clamp that jumps, what resists.
 
     What resists is the change of bending and tissue energy less what the points do: viscosity takes as much as time is left, and
     stands on neither side.

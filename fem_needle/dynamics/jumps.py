@@ -1,6 +1,6 @@
 """What a kink in front of a step does: jumps of speed, loads, hub and its velocity, guides that strike, a needle that is out.
 
-With inertia coordinates and momentum stay; velocities are those of the other side. A clamp that jumps by d_c is the limit of a ramp
+With inertia coordinates and momentum stay; velocities are of the other side. A clamp that jumps by d_c is the limit of a ramp
 that takes no time: what remains of the free coordinates' equation, integrated twice, and of the rigid guides' is
 
     M_ff d_f + M_fc d_c = N_f' r,   N_f d_f + N_c d_c = 0,   and integrated once   P_f jumps by -(C d)_f.
@@ -114,10 +114,10 @@ JUMP_FRACTION = 1e-9  # of a step: in this time viscosity lets nothing move
 def clamp_jumps(arrays):
     """Return whether the clamp stands somewhere else than the coordinates at the start say."""
     clamp, lateral = floats_3(arrays, CLAMP)[START], floats_3(arrays, LATERAL)[0]
+    largest = 0.0
     for c in range(integers_1(arrays, SWITCH)[PRESCRIBED]):
-        if np.abs(clamp[0, c] - lateral[0, c]) > SMALLEST_JUMP:
-            return True
-    return False
+        largest = max(largest, np.abs(clamp[0, c] - lateral[0, c]))
+    return largest > SMALLEST_JUMP
 
 
 @inner
@@ -134,15 +134,12 @@ def loads_jump(arrays):
 def has_rigid_guides(arrays):
     """Return whether any guide is rigid."""
     compliance = floats_1(arrays, COMPLIANCE)
-    for guide in range(len(compliance)):
-        if compliance[guide] == 0.0:
-            return True
-    return False
+    return bool(np.any(compliance == 0.0))
 
 
 @inner
 def answers_of_mass(arrays):
-    """Set M^-1 N' of the rigid guides at the start in ``ANSWERS``, the guides' numbers in ``CHOSEN``; returns how many they are."""
+    """Set M^-1 N' of the rigid guides at the start in ``ANSWERS``, their numbers in ``CHOSEN``; returns how many."""
     rows, first = floats_3(arrays, POINT_ROWS)[START], integers_2(arrays, POINT_FIRST)[START]
     answers, chosen = floats_2(arrays, ANSWERS), integers_1(arrays, CHOSEN)
     compliance, stretch, count = floats_1(arrays, COMPLIANCE), floats_2(arrays, COURSES)[START, STRETCH], 0
@@ -298,7 +295,7 @@ def left_velocities(arrays, pace):
 
 @inner
 def set_left(arrays, jumped):
-    """Set coordinates and guides' forces at the start to those before it, and let a needle with inertia follow a clamp that jumps."""
+    """Set coordinates and guides' forces at the start to those before; let a needle with inertia follow a clamp that jumps."""
     known, lateral = floats_2(arrays, KNOWN), floats_3(arrays, LATERAL)[0]
     if jumped and integers_1(arrays, SWITCH)[INERTIA]:
         carry(arrays)

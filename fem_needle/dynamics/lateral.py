@@ -112,8 +112,8 @@ def factor_step(arrays, h):
         stiffness[s] = floats_1(arrays, NUMBER)[BENDING_STIFFNESS] / (stretch * stretch * stretch)
     if switches[STRIDE]:
         eliminate_two(
-            last, switches[PRESCRIBED], floats_1(arrays, PIECE_NODES), stiffness, matrices, changed, floats_3(arrays, NODE_MATRICES),
-            floats_4(arrays, SHARES),
+            last, switches[PRESCRIBED], floats_1(arrays, PIECE_NODES), stiffness, matrices, changed,
+            floats_3(arrays, NODE_MATRICES), floats_4(arrays, SHARES),
         )  # fmt: skip
     else:
         if switches[PRINTED]:
@@ -134,8 +134,8 @@ def solve_step(arrays, is_whole, values):
         else:
             gaps[:, :] = 0.0
         solve_two(
-            switches[PRESCRIBED], nodes, floats_1(arrays, STIFFNESSES), floats_3(arrays, MATRICES), floats_3(arrays, NODE_MATRICES),
-            floats_4(arrays, SHARES), gaps, values,
+            switches[PRESCRIBED], nodes, floats_1(arrays, STIFFNESSES), floats_3(arrays, MATRICES),
+            floats_3(arrays, NODE_MATRICES), floats_4(arrays, SHARES), gaps, values,
         )  # fmt: skip
     else:
         solve_functions(arrays, 2, 0, values)
@@ -195,7 +195,7 @@ def begin_nodes(arrays):
 
 @inner
 def set_path_loads(arrays, cutting):
-    """Set the path's loads at the nodes: its history and, where the tip cuts, what the tip at the start gives of the new piece."""
+    """Set the path's loads at the nodes: history and, where the tip cuts, what the tip at the start gives of the new piece."""
     course, axial, cubic = floats_2(arrays, COURSES), floats_1(arrays, AXIAL_STATE), floats_1(arrays, CUBIC)
     load, load_rate = floats_2(arrays, PATH_LOAD), floats_2(arrays, PATH_LOAD_RATE)
     if cutting:

@@ -184,7 +184,7 @@ def solve_round(arrays, t, h, until, first, second, last, is_first):
 @stage
 def solve_stages(arrays, t, h, until):
     """Solve the stages of a step, of a push until the axial equations give the speeds with which they were solved."""
-    axial, limits, course = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LIMITS), floats_2(arrays, COURSES)
+    axial, limits = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LIMITS)
     places, pair = floats_2(arrays, METHOD)[PLACES], floats_1(arrays, PAIR)
     first, second, before, begin = axial[PACE], axial[PACE], np.inf, 0.0
     if axial[LANDED] != KINK and axial[LAST_LENGTH] > 0.0:
@@ -358,7 +358,7 @@ def take_step(arrays, t, h, until, is_last, is_output):
 def run_steps(arrays):
     """Take the steps of smooth intervals; returns how it ended (`names`: DONE, FAILED, EVENT, DIVERGED).
 
-    ``INTERVALS``: start and end [s], number of steps, and whether the end is an output (I, 4). ``CURSOR``: interval, step in it, rows
+    ``INTERVALS``: start and end [s], number of steps, whether the end is an output (I, 4). ``CURSOR``: interval, step in it, rows
     of the record so far, and whether the first step's start is an output too (4,); where the call stopped.
     """
     intervals, cursor, axial = floats_2(arrays, INTERVALS), integers_1(arrays, CURSOR), floats_1(arrays, AXIAL_STATE)

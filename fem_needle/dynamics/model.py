@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import comb
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,7 @@ class Model:
         return self.arrays[at.SWITCH]
 
 
-def is_known(plant: Plant) -> bool:
+def is_known(plant: Plant) -> TypeGuard[BeamNeedle]:
     """Return whether a plant's shapes are polynomials that say all of it: else the kernel asks it for its matrices."""
     return isinstance(plant, BeamNeedle) and plant.has_table
 
@@ -111,6 +111,7 @@ def _switches(plant: BeamNeedle, polynomials: PiecewisePolynomials, frame: int) 
 
 
 def numbers_of(plant: Plant) -> Array:
+    """Return what one number each says of a needle (NUMBERS,); `names` has their places."""
     scene, found = plant.scene, np.zeros(at.NUMBERS)
     needle, friction = scene.needle, scene.friction
     found[at.LENGTH], found[at.MASS_PER_LENGTH] = needle.length, needle.mass_per_length
@@ -123,6 +124,7 @@ def numbers_of(plant: Plant) -> Array:
 
 
 def layer_rows(scene: Scene) -> Array:
+    """Return start, end, foundation modulus, damping and cutting force of every layer (layers, 5)."""
     rows = [
         (layer.start, layer.far_side, layer.foundation_modulus, layer.damping, layer.cutting_force)
         for layer in scene.tissue.layers
@@ -131,7 +133,7 @@ def layer_rows(scene: Scene) -> Array:
 
 
 def _unit_integrals(shapes: Shapes, polynomials: PiecewisePolynomials, power: int, offset: float = 0.0) -> Array:
-    """Return psi_i psi_j, (x - offset)^p psi_i psi_j', (x - offset)^2p psi_i' psi_j' and psi_i'' psi_j'' of every piece (P, 4, m, m)."""
+    """Return psi_i psi_j, (x - offset)^p psi_i psi_j', (x - offset)^2p psi_i' psi_j', psi_i'' psi_j'' of pieces (P, 4, m, m)."""
     if polynomials.stride:  # assembled with scikit-fem on the unit element
         moved = shapes if offset == 0.0 else type(shapes)(shapes.breaks - offset, shapes.degree)  # type: ignore[call-arg, attr-defined]
         parts = [
@@ -182,7 +184,7 @@ def _beam_matrices(plant: BeamNeedle, polynomials: PiecewisePolynomials, units: 
 
 
 def mass_factor(blocks: Array, stride: int, size: int, clamped: int) -> Array:
-    """Return rows of the lower Cholesky factor of M (n, w + 1), the inverse of its diagonal last; room for one where M changes."""
+    """Return rows of the lower Cholesky factor of M (n, w + 1), its inverse diagonal last; room for one where M changes."""
     m = blocks.shape[2]
     width = m - 1
     rows = np.zeros((size, width + 1))

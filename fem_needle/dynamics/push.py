@@ -1,6 +1,6 @@
 """A needle that is pushed by a force: the kernel's steps, which end where something happens.
 
-Found around the kernel, on states: the needle stops or breaks away, reaches an interface, the end of what it has cut, a membrane, the
+Found around the kernel, on states: the needle stops or breaks away, reaches an interface, the end of its cut, a membrane, the
 end of the run. An event's time is found by false position and bisection; the state then lands on it exactly.
 """
 
@@ -124,7 +124,7 @@ class Push:
         self._axial[at.AXIAL_FORCE] = found
 
     def go(self, end: float, length: float, *, output: bool, from_start: bool = False) -> tuple[str | None, list[Samples]]:
-        """Go to a time [s] in steps of a length [s] and shorter ones up to what happens; returns why the run ends, and samples."""
+        """Go to a time [s] in steps of a length [s] or shorter ones, up to what happens; return why the run ends, and samples."""
         found: list[Samples] = []
         while self.time < end - 1e-12 * length:
             direction = self.direction

@@ -1,4 +1,4 @@
-"""A needle that goes through equilibria: the same instants, works and samples as in the loop over time steps, no method between them.
+"""A needle that goes through equilibria: instants, works and samples as in the loop over time steps, no method between them.
 
     (K + m G) q = N' P,   guides: N q + B P + compliance R = 0
 

@@ -24,8 +24,8 @@ class State:
     Attributes
     ----------
     values
-        Coordinates and momenta (planes, 2, n), insertion and clock (AXIAL,), works (LEDGER,), forces at points (p,), twist (2,), one
-        after the other.
+        Coordinates and momenta (planes, 2, n), insertion and clock (AXIAL,), works (LEDGER,), forces at points (p,), twist (2,):
+        one after the other.
     path
         Edges [m], cubics, moments and squares of the path that the tip has cut, one after the other; empty without one.
     pieces

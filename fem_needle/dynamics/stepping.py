@@ -1,4 +1,4 @@
-"""The phases of one step around its lateral solution: motion in time, the state at its end, and what a kink in front of it does."""
+"""The phases of one step around its lateral solution: motion in time, the state at its end, what a kink before it does."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def set_velocities(arrays, at):
 
 @inner
 def finish(arrays):
-    """Set the momenta at the nodes, and coordinates and momentum at the end of the step, from the polynomial through the nodes."""
+    """Set the momenta at the nodes, coordinates and momentum at the end of the step, from the polynomial through the nodes."""
     switches, course, beams = integers_1(arrays, SWITCH), floats_2(arrays, COURSES), floats_5(arrays, BEAM)
     known, rates, momenta = floats_2(arrays, KNOWN), floats_2(arrays, RATES), floats_2(arrays, MOMENTA)
     lateral, end = floats_3(arrays, LATERAL)[0], floats_2(arrays, METHOD)[END_SHARES]

@@ -12,8 +12,8 @@ behind it, A' = A + G_22,
     A_1 = G_11 + G_12 X + T' (A' X + G_21),   g_1 = f_1 + T' (g - A' Y) - G_12 Y.
 
 Nothing is divided by e: rounding costs an element one digit of the deflection, not (l / e)^3 of them. ``width`` unknowns stand
-for each coordinate: 1 of an equilibrium, 2 (the stages) of a time step; unknown s of a coordinate stands at width - 1 - s. Matrices
-of nodes are small and their size is known to the compiler: functions are made for each width. No pivots: docs/theory.md, "In one call".
+for each coordinate: 1 of an equilibrium, 2 (the stages) of a time step; unknown s of a coordinate is at width - 1 - s. Matrices
+of nodes are small their size is known to the compiler: functions are made for a width. No pivots: docs/theory.md, "In one call".
 """
 
 from __future__ import annotations
@@ -127,9 +127,7 @@ def _node_of(width: int) -> Any:
                 for k in range(size):
                     total += inverse[i, k] * x[k, j]
                 target[i, j] = total
-        for i in range(size):
-            for j in range(size):
-                x[i, j] = target[i, j]
+        x[:, :] = target
         for i in range(size):  # A' X + G_21
             for j in range(size):
                 total = a[right + i, j]
@@ -152,7 +150,7 @@ def _node_of(width: int) -> Any:
 
 
 def _backward_of(width: int) -> Any:
-    """Return the function that turns an element's loads into Y, in the second node's place, and what is left for the first node."""
+    """Return the function that turns an element's loads into Y, in the second node's place, and what is left to the first."""
     size, bubble, multiply = 2 * width, 2 * width, _bubble_product_of(width)
 
     @inner
@@ -239,7 +237,7 @@ def sweep_of(width: int) -> tuple[Any, Any]:
     -------
     eliminate(last, clamped, nodes, stiffness, matrices, is_new, node, shares)
         Eliminates bubbles of the elements' matrices (B, width m, width m) that are new, and goes from element ``last`` down to the
-        clamp; node (B + 1, k, k), k = 2 width, gets A of every node and, of the clamp, the inverse of the free part; shares
+        clamp; node (B + 1, k, k), k = 2 width, gets A of every node and, of the clamp, the free part's inverse; shares
         (B, 3, k, k) X, the inverse of I + F A', and T' A' + G_12.
     solve(clamped, nodes, stiffness, matrices, node, shares, gaps, values)
         Replaces a right-hand side (width n,) by the solution; gaps (B, k): c.

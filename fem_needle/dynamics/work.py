@@ -77,7 +77,8 @@ def _instants(model: Model) -> dict[int, NDArray[Any]]:
         at.COURSES: (at.COURSE,), at.CLAMP: (3, 2), at.FORCES: (p,), at.FORCE_RATES: (p,), at.PATH_LOAD: (n,),
         at.PATH_LOAD_RATE: (n,), at.PATH_CONSTANTS: (2,), at.KNOWN: (n,), at.RATES: (n,), at.MOMENTA: (n,),
         at.PRINTED_ERRORS: (2, printed, printed), at.TISSUE_BLOCKS: (blocks, 4, m, m), at.POINT_ROWS: (p, m),
-        at.POINT_RATES: (p, m), at.POINT_PLACES: (p, 2), at.FLEXIBLE: (p, p), at.FLEXIBLE_RATE: (p, p), at.INSTANT_SUMS: (at.SUMS,),
+        at.POINT_RATES: (p, m), at.POINT_PLACES: (p, 2), at.FLEXIBLE: (p, p), at.FLEXIBLE_RATE: (p, p),
+        at.INSTANT_SUMS: (at.SUMS,),
     }  # fmt: skip
     found: dict[int, NDArray[Any]] = {name: np.zeros((count, *shape)) for name, shape in shapes.items()}
     found[at.COVERED] = np.full((count, pieces, 3), np.nan)
@@ -109,7 +110,8 @@ def _space(model: Model, width: int) -> dict[int, NDArray[Any]]:
     found |= {
         at.ASKED: np.zeros(1, dtype=np.int64), at.ANSWERED: np.zeros(4), at.ANSWERED_LOAD: np.zeros((2, given)),
         at.SUBSPACE: np.zeros((at.INSTANTS, given, given)), at.RANKS: np.zeros(at.INSTANTS, dtype=np.int64),
-        at.REDUCED: np.zeros((width * given, width * given)), at.REDUCED_VALUES: np.zeros(2 * width * given), at.REDUCED_WORK: np.zeros((given, given)),
+        at.REDUCED: np.zeros((width * given, width * given)), at.REDUCED_VALUES: np.zeros(2 * width * given),
+        at.REDUCED_WORK: np.zeros((given, given)),
     }  # fmt: skip
     for name, size in ((at.CHANGED, blocks), (at.OTHER_CHANGED, blocks), (at.CHOSEN, guides)):
         found[name] = np.zeros(size, dtype=np.int64)

@@ -1,6 +1,6 @@
 """The works of a step: every term is evaluated on its own, nothing is what is missing (docs/theory.md, "Energy").
 
-Products with a rate that is not known are integrated by parts: integral F d(deflection) = [F deflection] - integral F' deflection dt.
+Products with a rate that is not known are integrated by parts: integral F dw = [F deflection] - integral F' deflection dt.
 """
 
 from __future__ import annotations
