@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
+from numba.core import cgutils, config
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
@@ -34,7 +34,8 @@ def _lookup(kind: Any, c_type: Any, dimensions: int) -> Any:
                 for column in range(dimensions + 1)
             ]
             size = context.get_abi_sizeof(context.get_data_type(kind))
-            strides, stride = [], ir.Constant(word, size)
+            strides: list[Any] = []
+            stride: Any = ir.Constant(word, size)
             for extent in reversed(entries[1:]):
                 strides.insert(0, stride)
                 stride = builder.mul(stride, extent)
@@ -56,16 +57,11 @@ def _lookup(kind: Any, c_type: Any, dimensions: int) -> Any:
         """Return the array, in Python."""
         shape = tuple(int(size) for size in table[name, 1 : dimensions + 1])
         total = int(np.prod(shape))
-        return (
-            np.frombuffer((c_type * total).from_address(int(table[name, 0])), dtype=c_type).reshape(shape)
-            if total
-            else np.zeros(shape, c_type)
-        )
+        if total == 0:
+            return np.zeros(shape, c_type)
+        return np.frombuffer((c_type * total).from_address(int(table[name, 0])), dtype=c_type).reshape(shape)
 
-    compiled = intrinsic(typed)
-    from numba.core import config
-
-    return looked_up if config.DISABLE_JIT else compiled  # type: ignore[attr-defined]
+    return looked_up if config.DISABLE_JIT else intrinsic(typed)  # type: ignore[attr-defined]
 
 
 floats_1 = _lookup(types.float64, ctypes.c_double, 1)

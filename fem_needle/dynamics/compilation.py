@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.resources import files
 from pathlib import Path
 from time import perf_counter
@@ -31,6 +32,7 @@ _ENTRANCE = _ARITHMETIC | {"_nrt": False, "no_cfunc_wrapper": True, "nogil": Tru
 _TABLE = types.Array(types.int64, 2, "C")
 _FUNCTIONS_SHARE = 0.75  # of the time goes into the functions, what is left into the whole that they become
 _SECONDS_PER_FUNCTION = 0.12
+_DIGITS = 12  # of what tells sources apart
 
 
 def inner(function: Callable[..., Any]) -> Any:
@@ -46,14 +48,14 @@ stage = inner
 
 
 def entrance(what: str, functions: int) -> Callable[[Callable[..., Any]], Entrance]:
-    """Let a function be an entrance.
+    """Compile a function that Python calls as a whole, and keep it on disk.
 
     Parameters
     ----------
     what
         Its name in messages.
     functions
-        How many functions are compiled for it, about: so that somebody who waits sees how long.
+        How many functions are compiled for it alone, about: so that somebody who waits sees how long.
     """
     return lambda function: Entrance(function, what, functions)
 
@@ -74,7 +76,8 @@ class Entrance:
         self.__name__, self.__doc__, self.__module__ = function.__name__, function.__doc__, function.__module__
         self._function = function
         self._is_ready = bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
-        self._run: Any = function if self._is_ready else _kept(function)
+        self._stamp = "" if self._is_ready else _stamp(function)
+        self._run: Any = function if self._is_ready else _kept(function, self._stamp)
 
     def __call__(self, table: NDArray[np.int64]) -> int:
         """Run it."""
@@ -84,32 +87,44 @@ class Entrance:
 
     @property
     def folder(self) -> Path | None:
-        """Where it is kept, None where that can be nowhere."""
+        """Where it is kept, None where it can be kept nowhere."""
         path = None if self._run is self._function else self._run.stats.cache_path
         return None if path is None else Path(path)
 
     def prepare(self) -> float:
-        """Load or compile it where that has not been done yet; returns the seconds that took."""
+        """Load or compile it where that has not been done yet: before threads or processes need it; returns the seconds."""
         began = perf_counter()
         with hastened():
             if not self._is_ready:
-                with event.install_listener("numba:compile", _Counter(self)):
-                    self._compile()
-                self._run.disable_compile()
+                self._read()
+                self._run.disable_compile()  # a table of another kind is a mistake
                 self._is_ready = True
         return perf_counter() - began
 
-    def _compile(self) -> None:
+    def _read(self) -> None:
+        """Load or compile it; what is kept and cannot be read is made anew."""
         try:
-            self._run.compile((_TABLE,))
+            self._compile()
         except NumbaError:
             raise
-        except Exception as error:  # what is on disk may be anything
-            if self.folder is None:
+        except Exception as error:
+            if self.compiled or self.folder is None:
                 raise
-            if not self._run.signatures:
-                self._run = njit(**_ENTRANCE)(self._function)
-                self._run.compile((_TABLE,))
+            notice.LOGGER.warning("what was kept of the %s in %s cannot be read: %s", self.what, self.folder, error)
+            _remove(self.folder, f"*.{self.__name__}{self._stamp}-*.nb[ic]")
+            self._run = _kept(self._function, self._stamp)
+            self._compile()
+
+    def _compile(self) -> None:
+        dispatcher = self._run
+        try:
+            with event.install_listener("numba:compile", _Counter(self)):
+                dispatcher.compile((_TABLE,))
+            if self.compiled:  # by now what was made of other sources is of no use
+                _remove(self.folder, f"*.{self.__name__}{self._stamp[:-_DIGITS]}{'?' * _DIGITS}-*.nb[ic]", self._stamp)
+        except OSError as error:
+            if not dispatcher.signatures:
+                raise
             notice.LOGGER.warning("the %s cannot be kept in %s: %s", self.what, self.folder, error)
 
 
@@ -121,6 +136,7 @@ class _Counter(event.Listener):
         self._depth = 0
 
     def on_start(self, event: event.Event) -> None:
+        """Announce the first one."""
         if self._depth == 0:
             notice.begun(
                 self._entrance.what,
@@ -130,16 +146,17 @@ class _Counter(event.Listener):
         self._depth += 1
 
     def on_end(self, event: event.Event) -> None:
+        """Count."""
         self._depth -= 1
         self._entrance.compiled += 1
         share = min(1.0, self._entrance.compiled / self._entrance.functions)
         notice.done(self._entrance.what, _FUNCTIONS_SHARE * share if self._depth else 1.0)
 
 
-def _kept(function: Callable[..., Any]) -> Any:
+def _kept(function: Callable[..., Any], stamp: str) -> Any:
     """Return a function that is kept on disk, by a name that is another where any file of its package is another."""
     name = function.__qualname__
-    function.__qualname__ = f"{name}_{_stamp(function.__module__.rpartition('.')[0])}"
+    function.__qualname__ = f"{name}{stamp}"
     try:
         return njit(**_ENTRANCE, cache=True)(function)
     except RuntimeError:  # no folder can be written
@@ -148,9 +165,18 @@ def _kept(function: Callable[..., Any]) -> Any:
         function.__qualname__ = name
 
 
-def _stamp(package: str) -> str:
-    """Return a text that differs for other sources and for code that checks its indices: numba looks at one file alone."""
-    digest = hashlib.sha256(repr(config.BOUNDSCHECK).encode())  # type: ignore[attr-defined]
-    for path in sorted((path for path in files(package).iterdir() if path.name.endswith(".py")), key=lambda path: path.name):
+def _stamp(function: Callable[..., Any]) -> str:
+    """Return a text that is another for other sources, of which numba itself sees one, and where indices are checked."""
+    digest = hashlib.sha256()
+    sources = (path for path in files(function.__module__.rpartition(".")[0]).iterdir() if path.name.endswith(".py"))
+    for path in sorted(sources, key=lambda path: path.name):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()[:12]
+    return f"_{'checked_' if config.BOUNDSCHECK else ''}{digest.hexdigest()[:_DIGITS]}"  # type: ignore[attr-defined]
+
+
+def _remove(folder: Path | None, pattern: str, but: str = "/") -> None:
+    """Remove files but those whose names contain something."""
+    for path in () if folder is None else folder.glob(pattern):
+        if but not in path.name:
+            with suppress(OSError):
+                path.unlink()
