@@ -72,6 +72,7 @@ RANKS = {
     "march": 10,
     "pushed_march": 11,
     "compiled": 2,
+    "dynamics": 8.5,
     "legs": 11,
     "loops": 12,
     "skipping": 9,
