@@ -7,7 +7,6 @@ All integrals are constants; with the stretch h of the frame (1, or the depth z)
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -19,8 +18,6 @@ from fem_needle.frames import Depth, Frame
 from fem_needle.loads import turns_with_needle
 from fem_needle.scene import Scene
 from fem_needle.shapes import Shapes
-from fem_needle.table_terms import Multiple, RateRow, Term
-from fem_needle.tables import BENDING, CENTRIFUGAL, CONVECTION, MASS
 
 Array = NDArray[np.float64]
 
@@ -35,27 +32,8 @@ class BeamMatrices:
     centrifugal: Array | None
 
 
-@dataclass(frozen=True, eq=False)
-class BeamRates:
-    """How the beam's energies change with the depth, over many depths (T,) (`fem_needle.tables.Rates`)."""
-
-    bending_share: Array
-    mass_share: Array
-    centrifugal_share: Array
-    rows: tuple[RateRow, ...]
-    tip_mass: float
-    tip_row: Array
-    tip_slope: Array
-
-
 class Beam(Protocol):
     """The beam without tissue."""
-
-    def terms(self, depths: Array) -> Iterator[Term]:
-        """Yield the matrices over many depths [m] (T,)."""
-
-    def rates(self, depths: Array) -> BeamRates:
-        """Return how the energies change with the depth, over many depths [m] (T,)."""
 
     def matrices(self, depth: float) -> BeamMatrices:
         """Return the matrices at a depth [m]."""
@@ -85,21 +63,6 @@ class ScaledBeam:
             unit.convection,
             None if unit.centrifugal is None else unit.centrifugal / stretch,
         )
-
-    def terms(self, depths: Array) -> Iterator[Term]:
-        """Yield the matrices over many depths [m] (T,)."""
-        stretch, unit = self.frame.stretch(depths) + 0.0 * depths, self.unit
-        yield Multiple(MASS, unit.mass, stretch)
-        yield Multiple(BENDING, unit.bending, _bending_scale(stretch))
-        if unit.convection is not None and unit.centrifugal is not None:
-            yield Multiple(CONVECTION, unit.convection, np.ones_like(depths))
-            yield Multiple(CENTRIFUGAL, unit.centrifugal, 1 / stretch)
-
-    def rates(self, depths: Array) -> BeamRates:
-        """Return -3 / h, 1 / h and -1 / h of K, M and R where the beam is stretched, zeros where not."""
-        share = self.frame.stretch_rate / (self.frame.stretch(depths) + 0.0 * depths)
-        none = np.zeros((len(depths), 1))
-        return BeamRates(-3 * share, share, -share, (), 0.0, none, none)
 
     def bending_rate_product(self, coordinates: Array, depth: float) -> Array | None:
         """Return -3 K q / h dh/dz."""

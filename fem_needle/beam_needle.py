@@ -13,16 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.beam_matrices import Beam
-from fem_needle.beam_table import matrix_table, point_rows, rate_table
 from fem_needle.foundation import Foundation
 from fem_needle.frames import Frame
 from fem_needle.loads import turns_with_needle
 from fem_needle.path import CutPath
-from fem_needle.plant import SMALLEST_COMPLIANCE, Operators, Points, RestTerms
+from fem_needle.plant import Operators, Points, RestTerms
 from fem_needle.row_blocks import row_blocks
 from fem_needle.scene import Guide, LateralLoad, Scene, as_function
 from fem_needle.shapes import Shapes
-from fem_needle.tables import OperatorTable, PointTable
 
 Array = NDArray[np.float64]
 
@@ -48,7 +46,7 @@ class BeamNeedle(ABC):
     largest_spectral_radius = 1.0
     warnings: tuple[str, ...] = ()
     stiffness_round_off = 0.0
-    has_table = True
+    is_polynomial = True
 
     def __init__(self, scene: Scene, shapes: Shapes, frame: Frame, beam: Beam) -> None:
         self.scene = scene
@@ -144,22 +142,6 @@ class BeamNeedle(ABC):
             places, stretch = self.frame.places(stations[inside], self.scene.needle.length, float(depth))
             result[inside] = self.shapes.evaluate(coordinates, places, derivative) / stretch**derivative
         return result
-
-    def table(self, depths: Array) -> OperatorTable:
-        """Return the plant at many depths [m] (T,) as arrays."""
-        first, rows, rates = point_rows(self.foundation, self.point_positions, self.turns, depths)
-        guides, needle = self.scene.support.guides, self.scene.needle
-        points = PointTable(
-            first,
-            rows,
-            rates,
-            *self._flexibilities(depths, first.shape[1]),
-            len(guides),
-            _compliances(guides),
-            SMALLEST_COMPLIANCE * needle.length**3 / (48 * needle.bending_stiffness),
-        )
-        beam = self._beam
-        return OperatorTable(matrix_table(beam, self.foundation, depths), rate_table(beam, self.foundation, depths), points)
 
     def _deflections(self, coordinates: Array, depths: Array, stations: Array, derivative: int) -> Array:
         """Return the same of many states: (T, n) and (T,) to (T, stations)."""

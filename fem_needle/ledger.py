@@ -7,14 +7,13 @@ evaluated on its own; nothing is a remainder. Derivation: docs/theory.md, sectio
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
 from fem_needle.collocation import Collocation
-from fem_needle.jumps import clamp_jump
 from fem_needle.path import CutPath
 from fem_needle.plant import Plant, RestTerms
 from fem_needle.stages import Stage, StageSolution, internal_force
@@ -239,65 +238,6 @@ def _moving_power(plant: Plant, stage: Stage, solution: StageSolution, *, inerti
     if inertia and stage.instant.acceleration:
         power -= stage.instant.acceleration * axial_momentum(stage, solution.coordinates, solution.velocities)
     return power
-
-
-def row_correction(parts: StepParts, *, inertia: bool, at_start: bool) -> Works:
-    """Return what the first (``at_start``) or the last step of a row of equal steps adds to the trapezoidal rule."""
-    if not inertia or not any(stage.instant.speed or stage.instant.acceleration for stage in parts.stages):
-        return Works()
-    first, second = ((end.stage, end.solution) for end in parts.ends)
-    states = [first, *zip(parts.stages, parts.solutions, strict=True), second]
-    powers = np.array([_moving_power(parts.plant, *state, inertia=True) for state in states])
-    slopes = parts.method.power_slopes @ powers
-    return Works(boundary_energy=parts.length / 12 * float(slopes[0] if at_start else -slopes[1]))
-
-
-def landing_works(before: StepEnd, after: StepEnd, *, inertia: bool) -> Works:
-    """Return the works at an instant where speed, loads or clamp may jump."""
-    followed = force_jump_work(before, after)
-    return followed + jump_works(before, after) if inertia else followed
-
-
-def jump_works(before: StepEnd, after: StepEnd) -> Works:
-    """Return the works at a jump of speed or of the hub's velocity: mean velocity times the jump of momentum.
-
-    The free coordinates' momentum jumps where a rigid guide strikes; the guide's own -R dw/dy is part of the axial force. It
-    jumps, too, where viscous tissue holds a needle whose hub jumps: that is the hub's work.
-    """
-    left, right = before.solution, after.solution
-    jump = axial_momentum(after.stage, right.coordinates, right.velocities) - axial_momentum(
-        before.stage, left.coordinates, left.velocities
-    )
-    boundary = 0.5 * (before.stage.instant.speed + after.stage.instant.speed) * jump
-    rates = 0.5 * (before.stage.case.clamp_rates + after.stage.case.clamp_rates)
-    clamped = min(2, right.momentum.shape[0])
-    hub = float(rates[:clamped] @ (right.momentum - left.momentum)[:clamped]) if np.any(rates) else 0.0
-    clamped = after.stage.operators.clamped
-    struck = float(0.5 * (left.velocities + right.velocities)[clamped:] @ (right.momentum - left.momentum)[clamped:])
-    if clamp_jump(after.stage, left.coordinates) is not None:
-        return Works(hub_work=hub + struck, boundary_energy=boundary)
-    return Works(hub_work=hub, boundary_energy=boundary + struck)
-
-
-def force_jump_work(before: StepEnd, after: StepEnd) -> Works:
-    """Return the works at a jump of the loads or of the clamp that the needle follows at once: mean force x jump of deflection.
-
-    With inertia a jump of the loads moves the kink at a point inside an element only. The work of a clamp that jumps is what
-    bending, tissue and points resist: what viscosity takes meanwhile grows as one over the time that is left, and stands on
-    neither side.
-    """
-    left, right = before.solution, after.solution
-    points = after.stage.points
-    moved = points.deflections(right.coordinates, right.forces) - points.deflections(left.coordinates, left.forces)
-    mean = 0.5 * (left.forces + right.forces)
-    load = float(mean[points.guides :] @ moved[points.guides :])
-    if clamp_jump(after.stage, left.coordinates) is None:
-        return Works(load_work=load)
-    stage, still = after.stage, np.zeros_like(left.coordinates)
-    instant = replace(stage.instant, speed=0.0)
-    elastic = internal_force(replace(stage, instant=instant), 0.5 * (left.coordinates + right.coordinates), still)
-    resisted = elastic + points.rows.T @ mean
-    return Works(load_work=load, hub_work=-float(resisted @ (right.coordinates - left.coordinates)))
 
 
 def _hub_power(stage: Stage, solution: StageSolution, *, inertia: bool) -> float:

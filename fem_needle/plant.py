@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from fem_needle import banded
 from fem_needle.path import CutPath
 from fem_needle.scene import Scene
-from fem_needle.tables import OperatorTable
 
 Array = NDArray[np.float64]
 
@@ -209,8 +208,8 @@ class Plant(Protocol):
         What a user should know of the model before trusting it.
     stiffness_round_off
         What a tip may lose, relative, to rounding in the stiffness matrix K; equilibria by `Operators.beam` lose nothing.
-    has_table
-        Whether it gives its matrices at many depths at once, which the compiled loop needs.
+    is_polynomial
+        Whether the polynomials of its shapes say all of it; else the kernel asks it for its matrices at every depth.
     """
 
     scene: Scene
@@ -222,16 +221,13 @@ class Plant(Protocol):
     largest_spectral_radius: float
     warnings: tuple[str, ...]
     stiffness_round_off: float
-    has_table: bool
+    is_polynomial: bool
 
     def operators(self, depth: float, time: float) -> Operators:
         """Return the matrices."""
 
     def points(self, depth: float) -> Points:
         """Return where point forces act."""
-
-    def table(self, depths: Array) -> OperatorTable:
-        """Return matrices, points and rates over many depths [m] (T,) for the compiled loop, of a plant that ``has_table``."""
 
     def clamp_reactions(self, residual: Array, depth: float) -> tuple[float, float]:
         """Return force [N] and moment [N m] of the clamp from what the coordinates' equations lack; zeros without a clamp."""

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 from fem_needle.choices import Choice
-from fem_needle.collocation import collocation
 from fem_needle.dynamics.grid import RunEnd, TimeGrid, time_grid
 from fem_needle.dynamics.run import VIBRATION, Integration, integration_of, run_samples, spectral_radius
 from fem_needle.dynamics.vibration import needs_no_steps
@@ -16,7 +15,6 @@ from fem_needle.models import ChosenPlant
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples, joined
 from fem_needle.scene import Scene
-from fem_needle.steppers import DynamicStepper, Inviscid, Massless, StaticStepper
 from fem_needle.trajectory import Trajectory, energy_warnings, summary_of, trajectory_from_samples
 
 
@@ -85,15 +83,6 @@ def integration(job: Job) -> Integration:
     if job.choice.analysis == "dynamic" and job.scene.numerics.time_step == "auto" and needs_no_steps(job.plant.scene):
         return Integration(VIBRATION)
     return integration_of(job.plant, job.scene, job.choice.analysis)
-
-
-def time_stepper(plant: Plant, scene: Scene, analysis: str) -> Any:
-    """Return how closed loops are stepped, until they have moved."""
-    if analysis == "dynamic":
-        return DynamicStepper(plant, collocation(spectral_radius(plant, scene)))
-    massless: Any = Inviscid(plant) if analysis == "static" else Massless(plant)
-    found = integration_of(plant, scene, analysis)
-    return StaticStepper(massless) if found.method is None else DynamicStepper(massless, found.method, inertia=False)
 
 
 def rounding_warnings(job: Job) -> tuple[str, ...]:

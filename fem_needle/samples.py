@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from time import perf_counter
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import axial, banded
-from fem_needle.ledger import StepEnd, Works, axial_momentum, configuration_force, energies
+from fem_needle.ledger import StepEnd, StepParts, Works, axial_momentum, configuration_force, energies
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import OVER_TIME, Samples
 from fem_needle.stages import internal_force
-from fem_needle.steppers import Step
 
 Array = NDArray[np.float64]
 Ending = TypeVar("Ending")
@@ -67,33 +65,13 @@ def stacked(samples: Sequence[Sample]) -> Samples:
     return Samples(**over_time, path_position=last.path_position, path_deflection=last.path_deflection, path_points=points)
 
 
-def in_blocks(marching: Generator[Sample, None, Ending]) -> Generator[Samples, None, Ending]:
-    """Yield the samples of a loop as rows of arrays, a few at a time; what it has given is yielded before it fails."""
-    pending, since = list[Sample](), perf_counter()
-    while True:
-        try:
-            pending.append(next(marching))
-        except StopIteration as finished:
-            if pending:
-                yield stacked(pending)
-            return finished.value
-        except BaseException:  # also an interrupt
-            if pending:
-                yield stacked(pending)
-            raise
-        if len(pending) == FEW or perf_counter() - since > PATIENCE:
-            yield stacked(pending)
-            pending, since = [], perf_counter()
-
-
 def sample_step(
-    plant: Plant, step: Step, works: Works, deepest: float, depth: float, *, at_start: bool, inertia: bool
+    plant: Plant, step: StepParts, works: Works, deepest: float, depth: float, *, at_start: bool, inertia: bool
 ) -> Sample:
     """Return the sample at the end of a step, or at the start of the first one.
 
     Rates of momentum come from the step's own polynomial; its error is of second order in the step.
     """
-    step = step.resolved(at_start=at_start)
     end = step.ends[0] if at_start else step.ends[1]
     instant, solution, scene = end.stage.instant, end.solution, plant.scene
     mass = scene.needle.mass_per_length * scene.needle.length
@@ -122,7 +100,7 @@ def sample_step(
     )
 
 
-def axial_force_at(plant: Plant, step: Step, *, at_start: bool, inertia: bool) -> float:
+def axial_force_at(plant: Plant, step: StepParts, *, at_start: bool, inertia: bool) -> float:
     """Return the axial force A [N] at the end, or the start, of a step; 0 of a model whose push does not feel it."""
     if not plant.axial_force_acts:
         return 0.0
@@ -137,9 +115,7 @@ def _ledger_values(end: StepEnd, works: Works, *, inertia: bool) -> dict[str, fl
     return held | {field.name: float(getattr(works, field.name)) for field in fields(works)}
 
 
-def _reactions(
-    plant: Plant, step: Step, end: StepEnd, *, at_start: bool, inertia: bool
-) -> tuple[Array, float]:
+def _reactions(plant: Plant, step: StepParts, end: StepEnd, *, at_start: bool, inertia: bool) -> tuple[Array, float]:
     """Return what the coordinates' equations lack, which a clamp gives, and the tissue's total lateral force."""
     stage, solution = end.stage, end.solution
     velocities = solution.velocities
@@ -166,7 +142,7 @@ def reactions_of_clamp(plant: Plant, residual: Array, depth: float, point_forces
     return plant.clamp_reactions(residual, depth)
 
 
-def _guide_forces(step: Step, end: StepEnd, *, inertia: bool) -> Array:
+def _guide_forces(step: StepParts, end: StepEnd, *, inertia: bool) -> Array:
     """Return the guides' forces; with inertia a rigid one's mean over the step, about which an index-3 multiplier alternates."""
     points = end.stage.points
     forces = end.solution.forces[: points.guides]
@@ -176,17 +152,17 @@ def _guide_forces(step: Step, end: StepEnd, *, inertia: bool) -> Array:
     return np.where(points.guide_compliance > 0.0, forces, np.sum(weighted, axis=0)) if points.guides else forces
 
 
-def _axial_momenta(step: Step) -> list[float]:
+def _axial_momenta(step: StepParts) -> list[float]:
     pairs = [(step.ends[0].stage, step.ends[0].solution), *zip(step.stages, step.solutions, strict=True)]
     return [axial_momentum(stage, solution.coordinates, solution.velocities) for stage, solution in pairs]
 
 
-def _rate_of_coordinates(step: Step, *, at_start: bool) -> Array:
+def _rate_of_coordinates(step: StepParts, *, at_start: bool) -> Array:
     states = [step.ends[0].solution, *step.solutions]
     return np.asarray(_rate(step, [state.coordinates for state in states], at_start=at_start))
 
 
-def _rate(step: Step, values: list[Any], *, at_start: bool) -> Any:
+def _rate(step: StepParts, values: list[Any], *, at_start: bool) -> Any:
     """Differentiate the polynomial through the values at the start and at the two nodes."""
     slopes = step.method.start_slope if at_start else step.method.end_slope
     return sum(slope * (value - values[0]) for slope, value in zip(slopes, values[1:], strict=True)) / step.length

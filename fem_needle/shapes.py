@@ -5,14 +5,12 @@ w = sum_i psi_i(x) q_i, with x a place on the line of the shapes (`frames` says 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.piecewise import PiecewisePolynomials
-from fem_needle.table_terms import Term
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -31,9 +29,6 @@ class IntervalIntegrals(Protocol):
 
     def add(self, start: float, end: float, factor: float, target: Array) -> None:
         """Add ``factor`` times the integral from ``start`` to ``end`` to a band matrix, in place."""
-
-    def terms(self, kind: int, starts: Array, ends: Array, factors: Array) -> Iterator[Term]:
-        """Yield the same over many intervals (T,) as terms of a kind of matrix (`fem_needle.tables`)."""
 
 
 class Shapes(Protocol):

@@ -8,18 +8,15 @@ with z only through the upper limit, so that dM/dz = rho A psi(z) psi(z) and so 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
-from fem_needle.beam_matrices import BeamMatrices, BeamRates
+from fem_needle.beam_matrices import BeamMatrices
 from fem_needle.frames import Depth
 from fem_needle.scene import Scene
-from fem_needle.table_terms import RateRow, Term
-from fem_needle.tables import BENDING, CENTRIFUGAL, CONVECTION, MASS
 from reduced_model.shapes import GaussIntegrals, LineShapes
 
 Array = NDArray[np.float64]
@@ -86,24 +83,6 @@ class GrowingBeam:
             upto(self._drag, mass) if self._is_convected else None,
             upto(self._slip, mass) if self._is_convected else None,
         )
-
-    def terms(self, depths: Array) -> Iterator[Term]:
-        """Yield the matrices over many depths (T,)."""
-        kinds = [(MASS, self._mass, self._mass_per_length), (BENDING, self._bending, self._bending_stiffness)]
-        if self._is_convected:
-            kinds += [(CONVECTION, self._drag, self._mass_per_length), (CENTRIFUGAL, self._slip, self._mass_per_length)]
-        for kind, integrals, factor in kinds:
-            yield from integrals.terms(kind, np.zeros_like(depths), depths, np.full_like(depths, factor))
-
-    def rates(self, depths: Array) -> BeamRates:
-        """Return how the energies grow with the depth: at the tip."""
-        first, curvatures = self._shapes.rows(depths, 2)
-        _, rows = self._shapes.rows(depths)
-        _, slopes = self._shapes.rows(depths, 1)
-        row = RateRow(first, curvatures, np.full_like(depths, self._bending_stiffness), is_tissue=False)
-        zero = np.zeros_like(depths)
-        slopes = slopes if self._is_convected else np.zeros_like(slopes)
-        return BeamRates(zero, zero, zero, (row,), self._mass_per_length, rows, slopes)
 
     def bending_rate_product(self, coordinates: Array, depth: float) -> Array:
         """Return dK/dz q = EI psi''(z) (psi''(z) . q)."""

@@ -9,8 +9,8 @@ import numpy as np
 from fem_needle import FiniteElementNeedle
 from fem_needle.choices import instants, tip_difference, tip_differences
 from fem_needle.comparison.ranges import wave_number_at_tip
-from fem_needle.free_response import natural_frequencies
 from fem_needle.dynamics.vibration import needs_no_steps
+from fem_needle.free_response import natural_frequencies
 from fem_needle.models import ChosenPlant
 from fem_needle.scene import Scene
 from reduced_model.needle import AssumedModeNeedle

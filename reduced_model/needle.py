@@ -93,7 +93,7 @@ class AssumedModeNeedle(BeamNeedle):
         self.corrections = shapes.size - count - 2
         grown = shapes.size - 2 if isinstance(frame, FixedFrame) else 0
         self.nearly_dependent = grown > INDEPENDENT_MODES
-        self.has_table = not self.nearly_dependent and scene.model.variant != "as-printed"
+        self.is_polynomial = not self.nearly_dependent and scene.model.variant != "as-printed"
         self.axial_force_acts = scene.model.variant == "conservative"
         self.warnings = (*variant_warnings(scene), *correction_warnings(scene))
         if self.nearly_dependent or any(guide.stiffness == "rigid" for guide in scene.support.guides):
@@ -110,15 +110,11 @@ class AssumedModeNeedle(BeamNeedle):
         return replace(operators, subspace=resolved_directions(bending, mass))
 
     def _as_printed(self, operators: Operators, depth: float) -> Operators:
-        bending, tissue, mass = (
-            banded.to_dense(band)[2:, 2:] for band in (operators.bending, operators.tissue, operators.mass)
-        )
+        bending, tissue, mass = (banded.to_dense(band)[2:, 2:] for band in (operators.bending, operators.tissue, operators.mass))
         position, velocity = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
         tip, stiffness = self.shapes.row(depth)[2:], printed_stiffness(self.scene)
         position[2:, 2:], velocity[2:, 2:] = printed_mistakes(bending, tissue, mass, tip, stiffness)
-        return replace(
-            operators, positional_error=banded.from_dense(position), velocity_error=banded.from_dense(velocity)
-        )
+        return replace(operators, positional_error=banded.from_dense(position), velocity_error=banded.from_dense(velocity))
 
     def describe(self) -> dict[str, int | float | str]:
         """Return kind, number of modes, variant and basis."""

@@ -19,7 +19,6 @@ from fem_needle.path import CutPath
 from fem_needle.piecewise import PiecewisePolynomials
 from fem_needle.plant import Operators, Points, RestTerms
 from fem_needle.row_blocks import row_blocks
-from fem_needle.tables import OperatorTable
 from reduced_model.bases import Basis
 from reduced_model.needle import INDEPENDENT_MODES, STABLE_SPECTRAL_RADIUS, resolved_directions
 
@@ -44,7 +43,7 @@ class ProjectedNeedle:
 
     axial_force_acts = True
     stiffness_round_off = 0.0
-    has_table = False
+    is_polynomial = False
 
     def __init__(self, needle: FiniteElementNeedle, basis: Basis) -> None:
         self.needle = needle
@@ -103,10 +102,6 @@ class ProjectedNeedle:
             rates = rates + points.rows @ self._columns(depth, 1)
         none = np.zeros_like(points.flexibility)
         return Points(points.rows @ columns, rates, none, none, points.guides, points.guide_compliance)
-
-    def table(self, depths: Array) -> OperatorTable:
-        """Refuse: its columns may move with the depth in any way."""
-        raise NotImplementedError("columns may move with the depth in any way")
 
     def clamp_reactions(self, residual: Array, depth: float) -> tuple[float, float]:
         """Return force [N] and moment [N m] of the clamp."""

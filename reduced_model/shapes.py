@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -16,7 +16,6 @@ from fem_needle import banded
 from fem_needle.gauss import gauss_rule
 from fem_needle.piecewise import PiecewisePolynomials, fitted_polynomials
 from fem_needle.shapes import Kind
-from fem_needle.table_terms import Block, Term
 from reduced_model.modes import ClampedFreeModes
 
 Array = NDArray[np.float64]
@@ -216,27 +215,6 @@ class GaussIntegrals:
         if end > breaks[last]:
             result = result + self._part(float(breaks[last]), end)
         return result
-
-    def terms(self, kind: int, starts: Array, ends: Array, factors: Array) -> Iterator[Term]:
-        """Yield the same over many intervals (T,) as one dense block."""
-        entries = factors[:, None, None] * (self._upto(ends) - self._upto(starts))
-        yield Block(kind, np.zeros(len(starts), dtype=np.int64), entries)
-
-    def _upto(self, ends: Array) -> Array:
-        """Return the integrals (T, size, size) from the line's start."""
-        breaks = self.shapes.breaks
-        panel = np.clip(np.searchsorted(breaks, ends, side="right") - 1, 0, len(breaks) - 2)
-        points, weights = gauss_rule(GAUSS_POINTS)
-        starts = breaks[panel]
-        sizes = ends - starts
-        places = starts[:, None] + sizes[:, None] * points
-        left, right = (
-            self.shapes.values(places.ravel(), order).reshape(-1, *places.shape) for order in _ORDERS[self.kind]
-        )
-        scaled = sizes[:, None] * weights * (places + self.shapes.offset) ** self._exponent
-        part = np.einsum("itg,tg,jtg->tij", left, scaled, right, optimize=True)
-        whole = np.concatenate([np.zeros((1, *self.panels.shape[1:])), np.cumsum(self.panels, axis=0)])
-        return np.asarray(whole[panel] + part, dtype=float)
 
     @property
     def _exponent(self) -> int:

@@ -9,6 +9,8 @@ The lowest vibrations move, the others follow the force at once: their complianc
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -29,7 +31,12 @@ from fem_needle.batch.columns import (
     TIME_STEP,
     VISCOSITY,
 )
-from fem_needle.compiled.bands import ENTRANCE, INNER
+
+# Sums may be reordered; NaN and infinity keep their meaning. Nothing is allocated, so no references are counted.
+FAST = {"contract", "reassoc", "nsz"}
+ARITHMETIC: dict[str, Any] = {"error_model": "numpy", "fastmath": FAST, "_nrt": False, "no_cfunc_wrapper": True}
+INNER = ARITHMETIC | {"no_cpython_wrapper": True}
+ENTRANCE = ARITHMETIC | {"cache": True, "nogil": True}
 
 
 @njit(**INNER)
@@ -155,7 +162,7 @@ def _add_convection(run, z, speed, rate, stage, convection, centrifugal, drag, m
 
 @njit(**INNER)
 def _solve(matrix, right):
-    """Replace the right-hand side by the solution, without pivoting; as in `fem_needle.compiled.bands.factor`."""
+    """Replace the right-hand side by the solution, without pivoting."""
     size = len(right)
     for i in range(size):
         inverse = 1.0 / matrix[i, i]

@@ -198,9 +198,12 @@ def _difference(coarser: Array, finer: Array) -> float:
 
 def _spectrum(scene: Scene, elements: int, moving: int) -> Spectrum:
     """Return the spectrum of a scene's model; of finite elements with as many elements as asked, unless the scene says."""
+    moves = scene.numerics.analysis in {"auto", "dynamic"}
     if scene.model.kind == "fem" and scene.numerics.elements == "auto":
         scene = scene.with_value("numerics.elements", elements)
-    return spectrum_of(build_plant(scene), moving if scene.numerics.analysis in {"auto", "dynamic"} else 0)
+    if scene.tissue.layers:  # the rows say how viscous: the matrix of the drag is asked for
+        scene = scene.with_value("tissue.layers.0.damping", 1.0)
+    return spectrum_of(build_plant(scene), moving if moves else 0)
 
 
 def prepared(rows: Array, spectrum: Spectrum, time_step: float) -> Callable[[Array, int, int], int]:

@@ -13,7 +13,6 @@ from fem_needle.motion import run_duration
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene, Sinusoid, Table, TipLoad
 from fem_needle.segments import one_layer_holds
-from fem_needle.tables import BENDING, CENTRIFUGAL, CONVECTION, DRAG, MASS
 
 Array = NDArray[np.float64]
 
@@ -43,27 +42,27 @@ class Spectrum:
 
 def spectrum_of(plant: Plant, moving: int) -> Spectrum:
     """Return the spectrum of a plant of a scene that `is_uniform`, its lowest ``moving`` vibrations with their convection."""
-    depth = np.array([0.5 * plant.scene.needle.length])
-    matrices, needle = plant.table(depth).matrices, plant.scene.needle
+    depth, needle, clamped = 0.5 * plant.scene.needle.length, plant.scene.needle, plant.prescribed
+    operators, viscous = plant.operators(depth, 0.0), max((layer.damping for layer in plant.scene.tissue.layers), default=0.0)
 
-    def unit(kind: int, factor: float) -> Array:
-        """Return a kind for unit depth, stiffness and mass."""
-        base = int(matrices.base_of[kind])
-        band = banded.trailing(np.asfortranarray(matrices.bases[base]), plant.prescribed)
-        return banded.to_dense(band) / factor
+    def unit(band: Array | None, factor: float) -> Array:
+        """Return a matrix for unit depth, stiffness, mass and viscosity."""
+        if band is None:
+            return np.zeros((plant.size - clamped, plant.size - clamped))
+        return banded.to_dense(banded.trailing(band, clamped)) / factor
 
-    mass = unit(MASS, needle.mass_per_length)
-    roots, shapes = vibrations(mass, unit(BENDING, needle.bending_stiffness))
+    roots, shapes = vibrations(
+        unit(operators.mass, needle.mass_per_length * depth), unit(operators.bending, needle.bending_stiffness / depth**3)
+    )
     lowest = shapes[:, :moving]
 
-    def between(kind: int, factor: float) -> Array:
-        if matrices.base_of[kind] < 0:
-            return np.zeros((moving, moving))
-        return np.ascontiguousarray(lowest.T @ unit(kind, factor) @ lowest)
+    def between(band: Array | None, factor: float) -> Array:
+        return np.ascontiguousarray(lowest.T @ unit(band, factor) @ lowest)
 
-    tips = plant.points(float(depth[0])).rows[-1, plant.prescribed :] @ shapes
-    convection, centrifugal = (between(kind, needle.mass_per_length) for kind in (CONVECTION, CENTRIFUGAL))
-    return Spectrum(roots, tips, convection, centrifugal, -between(DRAG, 1.0))
+    tips = plant.points(depth).rows[-1, clamped:] @ shapes
+    convection = between(operators.convection, needle.mass_per_length)
+    centrifugal = between(operators.centrifugal, needle.mass_per_length / depth)
+    return Spectrum(roots, tips, convection, centrifugal, between(operators.drag, viscous or 1.0))
 
 
 def is_uniform(scene: Scene) -> bool:

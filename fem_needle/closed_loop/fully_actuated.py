@@ -30,7 +30,7 @@ from fem_needle.collocation import collocation
 from fem_needle.dynamics.grid import output_times
 from fem_needle.errors import SceneError
 from fem_needle.initial import initial_state
-from fem_needle.ledger import StepEnd, Works, step_works
+from fem_needle.ledger import StepEnd, StepParts, Works, step_works
 from fem_needle.loads import load_case
 from fem_needle.motion import Instant, depth_law
 from fem_needle.plant import Plant
@@ -38,7 +38,6 @@ from fem_needle.samples import Sample, sample_step, stacked
 from fem_needle.scene import Scene
 from fem_needle.skipping import unneeded_terms
 from fem_needle.stages import StageSolution, evaluate_stage, internal_force, momentum
-from fem_needle.steppers import Step
 from fem_needle.trajectory import Trajectory, summary_of, trajectory_from_samples
 
 Array = NDArray[np.float64]
@@ -128,12 +127,12 @@ class IdealMotion:
     def _momentum(self, time: float) -> Array:
         return self.state(time).solution.momentum
 
-    def step(self, start: StepEnd, until: float) -> Step:
+    def step(self, start: StepEnd, until: float) -> StepParts:
         """Return what happens up to a time as a step, from which forces and works are taken."""
         method, time = collocation(1.0), start.stage.instant.time
         nodes = [self.state(time + node * (until - time)) for node in method.nodes]
         stages, solutions = tuple(node.stage for node in nodes), tuple(node.solution for node in nodes)
-        return Step(self.plant, method, until - time, (start, self.state(until)), stages, solutions)
+        return StepParts(self.plant, method, until - time, (start, self.state(until)), stages, solutions)
 
 
 def goal_depth(scene: Scene) -> float:
@@ -219,7 +218,7 @@ class _Account:
     works: Works = field(default_factory=Works)
     lateral_work: float = 0.0
 
-    def add(self, motion: IdealMotion, step: Step) -> None:
+    def add(self, motion: IdealMotion, step: StepParts) -> None:
         """Add what a step does: the plant's own works and that of the forces on the coordinates."""
         found, scene, power = step_works(step, inertia=True), self.plant.scene, 0.0
         friction = 0.0
@@ -232,7 +231,7 @@ class _Account:
         self.works = self.works + replace(found, friction_dissipation=friction)
 
 
-def _sample(plant: Plant, step: Step, works: Works, *, at_start: bool) -> Sample:
+def _sample(plant: Plant, step: StepParts, works: Works, *, at_start: bool) -> Sample:
     depth = step.ends[0 if at_start else 1].stage.instant.depth
     return sample_step(plant, step, works, depth, depth, at_start=at_start, inertia=True)
 

@@ -53,7 +53,7 @@ class Model:
 
 def is_known(plant: Plant) -> TypeGuard[BeamNeedle]:
     """Return whether a plant's shapes are polynomials that say all of it: else the kernel asks it for its matrices."""
-    return isinstance(plant, BeamNeedle) and plant.has_table
+    return isinstance(plant, BeamNeedle) and plant.is_polynomial
 
 
 def model_of(plant: BeamNeedle, *, inertia: bool, viscous: bool = True) -> Model:

@@ -236,7 +236,7 @@ def sweep_of(width: int) -> tuple[Any, Any]:
     Returns
     -------
     eliminate(last, clamped, nodes, stiffness, matrices, is_new, node, shares)
-        Eliminates bubbles of the elements' matrices (B, width m, width m) that are new, and goes from element ``last`` down to the
+        Eliminates bubbles of the elements' matrices (B, width m, width m) that are new, and goes from element ``last`` to the
         clamp; node (B + 1, k, k), k = 2 width, gets A of every node and, of the clamp, the free part's inverse; shares
         (B, 3, k, k) X, the inverse of I + F A', and T' A' + G_12.
     solve(clamped, nodes, stiffness, matrices, node, shares, gaps, values)

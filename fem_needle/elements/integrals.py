@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,6 @@ from fem_needle import banded
 from fem_needle.elements.mesh import LineMesh
 from fem_needle.gauss import gauss_rule
 from fem_needle.shapes import Kind
-from fem_needle.table_terms import Block, Range, Term
 
 Array = NDArray[np.float64]
 
@@ -63,30 +61,6 @@ class IntervalIntegrals:
             self._add_part(first_whole - 1, start, nodes[first_whole], factor, target)
         if end_whole < last and end > nodes[end_whole]:
             self._add_part(end_whole, nodes[end_whole], end, factor, target)
-
-    def terms(self, kind: int, starts: Array, ends: Array, factors: Array) -> Iterator[Term]:
-        """Yield the same over many intervals (T,): a range of whole elements and the two that the ends cut."""
-        nodes, last, stride = self.mesh.nodes, self.mesh.elements, self.mesh.reference.stride
-        first_whole = np.searchsorted(nodes, starts, side="left")
-        end_whole = np.searchsorted(nodes, ends, side="right") - 1
-        within = end_whole < first_whole
-        yield Range(kind, self.band, self.local, factors, first_whole, end_whole)
-        element = np.clip(np.where(within, end_whole, first_whole - 1), 0, last - 1)
-        upto = np.where(within, ends, nodes[np.minimum(first_whole, last)])
-        used = within | (first_whole > 0)
-        yield Block(kind, stride * element, self._parts(element, starts, np.where(used, upto, starts), factors))
-        element = np.clip(end_whole, 0, last - 1)
-        begin = np.where(within | (end_whole >= last), ends, nodes[np.maximum(end_whole, 0)])
-        yield Block(kind, stride * element, self._parts(element, begin, ends, factors))
-
-    def _parts(self, elements: NDArray[np.int64], starts: Array, ends: Array, factors: Array) -> Array:
-        """Return the integrals (T, m, m) over parts of elements."""
-        points, weights = gauss_rule(_POINTS)
-        sizes = (ends - starts)[:, None]
-        positions = starts[:, None] + sizes * points
-        places = np.clip((positions - self.mesh.nodes[elements][:, None]) / self.mesh.lengths[elements][:, None], 0.0, 1.0)
-        left, right = self._factors(elements, places, positions)
-        return np.einsum("itg,tg,jtg->tij", left, sizes * factors[:, None] * weights, right, optimize=True)
 
     def _add_whole(self, first: int, end: int, factor: float, target: Array) -> None:
         stride, count = self.mesh.reference.stride, self.mesh.reference.count

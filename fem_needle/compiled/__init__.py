@@ -1,1 +1,0 @@
-"""The time loop compiled: one call for a whole row of steps, no Python per step (numba)."""
