@@ -34,6 +34,12 @@ NOTHING_TO_LEAVE_OUT = "warning: --no-energies does nothing any more: works and 
 REPEAT = "Run it N times with other scatter and noise; leaves a study in runs/<name>-steer."
 
 
+def _tell_nothing(asked: bool) -> None:
+    """Tell who asks for a loop without energies that there is none."""
+    if asked:
+        typer.echo(NOTHING_TO_LEAVE_OUT, err=True)
+
+
 def register(application: typer.Typer) -> None:
     """Add the command."""
     application.command(NAME)(steer)
@@ -58,7 +64,7 @@ def steer(
     analysis: shared.Analysis = None,
     output_step: shared.OutputStep = None,
     assignments: shared.Assignments = None,
-    no_energies: Annotated[bool, typer.Option("--no-energies", help=NO_ENERGIES)] = False,
+    no_energies: Annotated[bool, typer.Option("--no-energies", help=NO_ENERGIES, callback=_tell_nothing)] = False,
     no_vtk: shared.NoVtk = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json, or steer.json, and nothing else.")] = False,
     explain: shared.Explain = False,
@@ -77,8 +83,6 @@ def steer(
     loaded = steered(load_scene(scene), assignments or (), options, controller, sensor or ())
     folder = out or RUNS / (Path(scene).stem if repeat is None else f"{Path(scene).stem}-{NAME}")
     target = RunTarget(folder, force, numbered=out is None, for_study=repeat is not None)
-    if no_energies:
-        typer.echo(NOTHING_TO_LEAVE_OUT, err=True)
     if repeat is None:
         _steer(loaded, target, vtk=not no_vtk, quiet=as_json)
     else:

@@ -94,6 +94,8 @@ class DrivenNeedle:
         With or without inertia, or through equilibria, and by which method.
     time_step
         Largest step [s].
+    state
+        Where it begins, of a needle of the same plant; default: at t = 0.
 
     Attributes
     ----------
@@ -105,9 +107,10 @@ class DrivenNeedle:
         What is commanded.
     """
 
-    def __init__(self, plant: Plant, integration: Integration, time_step: float) -> None:
+    def __init__(self, plant: Plant, integration: Integration, time_step: float, state: NeedleState | None = None) -> None:
         scene = plant.scene
         self._plant, self._scene, self._time_step = plant, scene, time_step
+        self._settings = (integration, time_step)
         self._push: LoopPush | None = None
         self._engine = LoopEngine(plant, integration.kind, integration.method)
         if scene.insertion.kind == "force" and integration.kind != REST:
@@ -121,14 +124,20 @@ class DrivenNeedle:
         self._driving = (self.inputs, Stretch(0.0))
         self._before, self._call = np.zeros_like(self._live.values), Call(0.0, 0.0, 1.0, 0, False)
         self.time = 0.0
-        start = initial_state(plant if integration.kind == DYNAMIC else massless(plant), self._course.law)
-        self._engine.begin(start, self._course.law.depth(0.0))
-        self._begin(min(self._time_step, self._course.stretch(0.0, self.depth, self.depth, self.inputs).until))
+        if state is not None:
+            self.restore(state)
+        else:
+            self._begin(plant if integration.kind == DYNAMIC else massless(plant))
 
     @property
     def depth(self) -> float:
         """Inserted length [m]."""
         return self._axial.item(at.WAY)
+
+    @property
+    def width(self) -> int:
+        """Numbers of a record."""
+        return len(self._engine.row)
 
     @property
     def speed(self) -> float:
@@ -229,9 +238,15 @@ class DrivenNeedle:
         if self._push is not None:
             self._push.counted = state.counted
 
-    def _begin(self, length: float) -> None:
+    def twin(self) -> DrivenNeedle:
+        """Return another needle in the same state."""
+        return DrivenNeedle(self._plant, *self._settings, self.state())
+
+    def _begin(self, resting: Plant) -> None:
         """Take a trial step for the record at t = 0, and the state there as what was before: its own kink does no work."""
-        engine, push = self._engine, self._push
+        engine, push, law = self._engine, self._push, self._course.law
+        engine.begin(initial_state(resting, law), law.depth(0.0))
+        length = min(self._time_step, self._next_stretch().until)
         if push is not None:
             push.begin(self._time_step)
         before = engine.state()

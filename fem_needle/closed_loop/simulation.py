@@ -118,14 +118,18 @@ class Simulation:
 
     def _begin(self, seed: int) -> None:
         """Stand at t = 0 with new sensors."""
+        self._make(seed)
+        self._rig.sample(self._needle)
+        self._keep()
+
+    def _make(self, seed: int) -> None:
+        """Have new sensors beside the needle, and nothing recorded."""
         needle, scene = self._needle, self.scene
         self._rig = SensorRig(scene, seed, self._settings["repetition"])
         self._commands: frozenset[str] = frozenset() if scene.controller.kind == "none" else frozenset({scene.controller.input})
-        self._record = LoopRecord(scene, len(needle.row()))
+        self._record = LoopRecord(scene, needle.width)
         self.stop_reason: str | None = None
         self._account = Account(scene, needle.depth, needle.tip_deflection)
-        self._rig.sample(needle)
-        self._keep()
 
     @property
     def time(self) -> float:
@@ -175,7 +179,12 @@ class Simulation:
 
     def copy(self) -> Simulation:
         """Return an independent simulation in the same state."""
-        return _rebuilt(self.plant, self._settings, self.state, clock.perf_counter() - self._started)
+        other: Simulation = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other._needle = self._needle.twin()
+        other._make(self.scene.run.seed)
+        other.restore(self.state)
+        return other
 
     def reset(self, seed: int | None = None) -> None:
         """Go back to t = 0.

@@ -25,7 +25,14 @@ SENSORS = [
 ]
 SPEEDS = Insertion(kind="speed", initial_depth=0.0475, speed=Table(time=[0.0, 1.0], value=[1.0, 1.0]))
 PUSH = Insertion(kind="force", initial_depth=0.048, push_force=0.6)
-FORCES = [{"lateral_force": 0.2}, {}, {"lateral_force": -0.1, "tip_direction": 0.4}, {"lateral_force": 0.15}, {}, {"tip_direction": -1.0}]
+FORCES = [
+    {"lateral_force": 0.2},
+    {},
+    {"lateral_force": -0.1, "tip_direction": 0.4},
+    {"lateral_force": 0.15},
+    {},
+    {"tip_direction": -1.0},
+]
 RATED = {"actuators.lateral_force": {"rate": 60.0, "maximum": 0.25}}
 TURNS = [{"speed": value} for value in (2.0, -1.5, -1.5, 0.0, 3.0, 1.0)]
 PUSHES = [{"push_force": value} for value in (0.2, 1.2, -0.8, -0.8, 0.05, 1.5)]
@@ -154,5 +161,7 @@ def test_a_look_at_the_run_changes_nothing(name):
     for command in commands:
         watched.step(command, 1.7e-3)
         last = watched.trajectory()
-        assert last.time[-1] == watched.time and last.tip_deflection[-1] == pytest.approx(watched.tip_deflection, rel=1e-9, abs=1e-15)
+        assert last.time[-1] == watched.time and last.tip_deflection[-1] == pytest.approx(
+            watched.tip_deflection, rel=1e-9, abs=1e-15
+        )
     assert_same(([], *went_on(watched, [])[1:]), ([], *expected[1:]))
