@@ -17,6 +17,7 @@ from typing import Annotated
 
 import typer
 
+from fem_needle.cli.waiting import compilations_shown
 from fem_needle.errors import NeedleError, SceneError, SuspiciousValueWarning, no_memory
 
 GROUPS = (
@@ -33,6 +34,7 @@ GROUPS = (
     "fem_needle.cli.identify",
     "fem_needle.cli.benchmark",
     "fem_needle.cli.stress",
+    "fem_needle.cli.warm",
 )
 ENTRY_POINTS = "fem_needle.commands"
 
@@ -45,7 +47,7 @@ def main() -> None:
     """Run the command line; exit status 0 done, 2 wrong input, 1 failed."""
     warnings.simplefilter("ignore", SuspiciousValueWarning)  # the commands show them themselves
     try:
-        with _ended_as_interrupted():
+        with _ended_as_interrupted(), compilations_shown():
             build_application()()
     except SceneError as error:
         _stop(error.mistakes, WRONG_INPUT)

@@ -91,6 +91,11 @@ class Entrance:
         path = None if self._run is self._function else self._run.stats.cache_path
         return None if path is None else Path(path)
 
+    @property
+    def is_kept(self) -> bool:
+        """Whether it is there for the next process."""
+        return self.folder is not None and any(self.folder.glob(f"*.{self.__name__}{self._stamp}-*.nbc"))
+
     def prepare(self) -> float:
         """Load or compile it where that has not been done yet: before threads or processes need it; returns the seconds."""
         began = perf_counter()
