@@ -134,7 +134,10 @@ def loads_jump(arrays):
 def has_rigid_guides(arrays):
     """Return whether any guide is rigid."""
     compliance = floats_1(arrays, COMPLIANCE)
-    return bool(np.any(compliance == 0.0))
+    smallest = np.inf
+    for guide in range(len(compliance)):
+        smallest = min(smallest, compliance[guide])
+    return smallest == 0.0
 
 
 @inner

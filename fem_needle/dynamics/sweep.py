@@ -119,7 +119,7 @@ def _node_of(width: int) -> Any:
     size = 2 * width
 
     @inner
-    def pass_on(e, a, x, inverse, carry, target):
+    def pass_on(e, a, x, inverse, carry, target):  # noqa: PLR0912 (loops over small matrices)
         right = a.shape[0] - size
         for i in range(size):
             for j in range(size):
@@ -127,7 +127,9 @@ def _node_of(width: int) -> Any:
                 for k in range(size):
                     total += inverse[i, k] * x[k, j]
                 target[i, j] = total
-        x[:, :] = target
+        for i in range(size):
+            for j in range(size):
+                x[i, j] = target[i, j]
         for i in range(size):  # A' X + G_21
             for j in range(size):
                 total = a[right + i, j]

@@ -1,16 +1,13 @@
 """The energy ledger: every term is evaluated on its own, so that their sum is a test."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from fem_needle import FiniteElementNeedle, ledger, run_scene, simulate, solve_static
+from fem_needle import FiniteElementNeedle, run_scene, simulate, solve_static
 from fem_needle.exact import exact_static
 from fem_needle.ledger import configuration_force
-from fem_needle.legs import works
-from fem_needle.legs.states import Leg
 from fem_needle.loads import load_case
 from fem_needle.motion import Instant
 from fem_needle.scene import Friction, Guide, Insertion, LateralLoad, Layer, Model, Numerics, Sinusoid, Table, TipLoad
@@ -155,44 +152,6 @@ def test_dropped_below_the_smallest_depth_and_inserted_again():
     assert np.count_nonzero(outside) >= 2
     assert np.all(run.tip_deflection[outside] == 0.0)
     assert run.summary["relative_energy_residual"] < 1e-6
-
-
-# Break one term at a time and see the residual.
-
-
-BROKEN = {
-    "numpy": [(ledger, name) for name in ("energy_force", "contact_force", "dissipation", "_hub_power", "axial_momentum")],
-    "compiled": [
-        *((Leg, name) for name in ("energy_forces", "contact_forces", "dissipation", "axial_momenta")),
-        (works, "_hub_steps"),
-    ],
-}
-
-
-@pytest.mark.parametrize(
-    ("loop", "place", "name"),
-    [pytest.param(loop, *term, marks=[pytest.mark.slow] * (loop == "numpy")) for loop, terms in BROKEN.items() for term in terms],
-    ids=lambda value: value if isinstance(value, str) else "",
-)
-def test_a_broken_term_shows(monkeypatch, loop, place, name):
-    scene_name = "growing" if name.startswith("axial") else "hub moves, swells, force travels"
-    case, analysis, _, _ = SCENES[scene_name]
-    case = case.with_value("numerics.loop", loop)
-    intact, original = residual_of(case, analysis, 4e-5, elements=8), getattr(place, name)
-    monkeypatch.setattr(place, name, lambda *args, **options: 1.01 * original(*args, **options))
-    assert residual_of(case, analysis, 4e-5, elements=8) > 100.0 * intact
-
-
-def test_a_missing_work_of_swelling_shows(monkeypatch):
-    case, analysis, _, _ = SCENES["hub moves, swells, force travels"]
-    case = case.with_value("numerics.loop", "numpy")
-    plain = FiniteElementNeedle.operators
-
-    def without(self, depth, time):
-        return replace(plain(self, depth, time), tissue_rate=None)
-
-    monkeypatch.setattr(FiniteElementNeedle, "operators", without)
-    assert residual_of(case, analysis, 4e-5) > 1e-3
 
 
 # The axial force A of equilibria, against the exact solution.

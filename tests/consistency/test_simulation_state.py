@@ -110,7 +110,7 @@ def test_copies_go_on_with_the_same_bits(name, model):
     other = copy.deepcopy(simulation)
     simulation.restore(state)
     assert_same(went_on(simulation, commands[3:]), expected)
-    assert_same(went_on(pickle.loads(stored), commands[3:]), expected)  # noqa: S301
+    assert_same(went_on(pickle.loads(stored), commands[3:]), expected)
     other.restore(state)
     assert_same(went_on(other, commands[3:]), expected)
 

@@ -4,12 +4,10 @@ import resource
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
 from fem_needle import load_scene, run_scene, steer
 from fem_needle.errors import SceneError
-from fem_needle.march import equal_times
 from fem_needle.scene import table_file
 from fem_needle.scene.table_file import csv_rows
 from tests.house.source import ROOT
@@ -43,13 +41,6 @@ def test_loops_without_end_are_refused(key):
 def test_too_many_repetitions_are_refused(command_line):
     status, _, err = command_line("steer", "steering", "--repeat", 100_001)
     assert (status, "got 100001; allowed 1 to 100000" in err) == (2, True)
-
-
-@pytest.mark.parametrize(("start", "end", "count"), [(0.0, 1.0, 1), (0.1, 0.7, 3), (1e-9, 16.0, 10_007), (3.3, 3.4, 4096)])
-def test_times_are_made_piecewise_to_the_same_bits(start, end, count):
-    expected = np.linspace(start, end, count + 1)
-    expected[-1] = end
-    assert list(equal_times(start, end, count)) == expected.tolist()
 
 
 def test_a_table_of_too_many_cells_is_refused_unread(monkeypatch):

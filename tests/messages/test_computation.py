@@ -1,7 +1,6 @@
 """Messages about computations that fail, which no other test meets; where only a broken machine would tell, it is broken here."""
 
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,7 +16,6 @@ from fem_needle import (
     mesh_file,
     refined_run,
     run_scene,
-    simulate,
     simulate_many,
     study_files,
 )
@@ -30,14 +28,8 @@ from fem_needle.closed_loop.simulation import Simulation
 from fem_needle.comparison.runs import shape_at
 from fem_needle.dynamics.names import FAILED
 from fem_needle.identification import sample_tips
-from fem_needle.march import started
-from fem_needle.motion import depth_law
-from fem_needle.pushed_march import started_push
-from fem_needle.pushing import Pusher
-from fem_needle.run_job import time_stepper
 from fem_needle.scene import Insertion, LateralLoad, TipLoad
 from fem_needle.statics import solve_static
-from fem_needle.steppers import DynamicStepper
 from reduced_model.identification import bending
 from tests.consistency.scenes import BUZZ, held, moving, scene_of
 
@@ -69,41 +61,6 @@ def test_a_run_of_many_without_a_finite_answer(monkeypatch):
     monkeypatch.setattr(many, "prepared", spoiled)
     with pytest.raises(ComputationError, match="run 2 has no finite answer: check its values, or use a smaller time_step"):
         simulate_many(GLIDING, {"tissue.layers.0.foundation_modulus": [1e3, 2e3, 3e3]}, time_step=1e-3, vibrations=2, cores=1)
-
-
-@pytest.mark.parametrize("pushes", [False, True], ids=["moved", "pushed"])
-def test_there_is_no_sample_before_the_first_step(pushes):
-    scene = PUSHED if pushes else GLIDING
-    plant = FiniteElementNeedle(scene, elements=2)
-    stepper = time_stepper(plant, scene, "dynamic")
-    run = started_push(plant, stepper, 1e-4) if pushes else started(plant, stepper, depth_law(scene))
-    with pytest.raises(ComputationError, match="there is no sample before the first step"):
-        run.sample()
-
-
-def test_a_pushed_step_that_fails_says_where(monkeypatch):
-    plant = FiniteElementNeedle(PUSHED, elements=2)
-    run = started_push(plant, time_stepper(plant, PUSHED, "dynamic"), 1e-4)
-    monkeypatch.setattr(Pusher, "step", failing(FloatingPointError("the insertion speed does not converge")))
-    run.limits = replace(run.limits, final_depth=None, contact=0.05)
-    monkeypatch.setattr(type(run), "_levels", lambda self: SimpleNamespace(next=lambda depth, direction: None))
-    with pytest.raises(ComputationError, match=r"time 0 s, depth 0\.1 m failed: the insertion speed .*; use a smaller time_step"):
-        run.advance(1e-4)
-
-
-def test_a_step_to_what_is_no_number_says_where(monkeypatch):
-    plant = FiniteElementNeedle(GLIDING.with_value("numerics.loop", "numpy"), elements=2)
-    advance = DynamicStepper.advance
-
-    def spoiled(self, law, start, until, last):
-        step = advance(self, law, start, until, last)
-        if until > 0.005:
-            step.ends[1].solution.coordinates[:] = np.nan
-        return step
-
-    monkeypatch.setattr(DynamicStepper, "advance", spoiled)
-    with pytest.raises(ComputationError, match=r"time 0\.005 s, depth .* failed: the deflection is not finite"):
-        simulate(plant, time_step=1e-3, analysis="dynamic", output_step=5e-3)
 
 
 def test_a_compiled_loop_without_a_finite_answer_says_where(monkeypatch):

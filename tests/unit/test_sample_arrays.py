@@ -5,12 +5,12 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from fem_needle import FiniteElementNeedle, row_blocks, run_scene, samples
-from fem_needle.march import march, time_grid
+from fem_needle import FiniteElementNeedle, row_blocks, run_scene
+from fem_needle.dynamics.grid import time_grid
+from fem_needle.dynamics.run import run_samples, without_inertia
 from fem_needle.sample_arrays import OVER_TIME, Samples, joined
-from fem_needle.samples import Sample, in_blocks, stacked
+from fem_needle.samples import Sample, stacked
 from fem_needle.scene import Guide, LateralLoad, TipLoad
-from fem_needle.skipping import inertia_free_stepper
 from fem_needle.trajectory import trajectory_from_samples
 from fem_needle.vtk_export import frames_of_samples
 from tests.consistency.scenes import GEL, LENGTH, moving, scene_of
@@ -86,40 +86,6 @@ def test_blocks_are_joined(given):
     assert same(joined([whole]), whole)
 
 
-def feeding(given, error=None):
-    yield from given
-    if error is not None:
-        raise error
-    return "end"
-
-
-def blocks_of(loop):
-    """The blocks of a loop and what it returns or raises."""
-    found, blocks = in_blocks(loop), []
-    try:
-        while True:
-            blocks.append(next(found))
-    except StopIteration as finished:
-        return blocks, finished.value
-    except BaseException as error:
-        return blocks, error
-
-
-@pytest.mark.parametrize("error", [None, KeyboardInterrupt(), ArithmeticError("wrong")])
-@pytest.mark.parametrize("count", [0, 3, 4, 6])
-def test_a_loop_gives_a_few_samples_at_a_time_and_loses_none(given, error, count):
-    blocks, end = blocks_of(feeding(given[:count], error))
-    assert end is error if error is not None else end == "end"
-    assert [len(block) for block in blocks] == {0: [], 3: [3], 4: [4], 6: [4, 2]}[count]
-    assert not blocks or same(joined(blocks), stacked(given[:count]))
-
-
-def test_a_slow_loop_is_not_waited_for(given, monkeypatch):
-    monkeypatch.setattr(samples, "PATIENCE", -1.0)
-    blocks, _ = blocks_of(feeding(given))
-    assert [len(block) for block in blocks] == [1] * len(given)
-
-
 def states(plant, count=60):
     """Random states (T, n), forces (T, p) and depths (T,), from hardly inserted to almost the whole length."""
     random = np.random.default_rng(7)
@@ -176,17 +142,18 @@ def test_a_trajectory_has_the_samples_and_their_shapes(support):
     loads = [TipLoad(force=0.1), *([LateralLoad(position=-0.0123, force=0.3)] if support == "hub" else [])]
     scene = scene_of(support, moving(0.5, 0.04, 0.09), GEL, loads, **(GUIDED if support == "hub" else {"duration": 0.1}))
     plant = FiniteElementNeedle(scene, elements=4)
-    shown = list(march(plant, inertia_free_stepper(plant), time_grid(plant, 0.01, 0.01)))
-    run = trajectory_from_samples(plant, stacked(shown), {})
+    whole = joined(list(run_samples(plant, without_inertia(scene), time_grid(plant, 0.01, 0.01))))
+    shown = [whole.rows(slice(row, row + 1)) for row in range(len(whole))]
+    run = trajectory_from_samples(plant, whole, {})
     tip, hub = np.array([LENGTH]), np.zeros(1)
     for row, sample in enumerate(shown):
-        state = (sample.coordinates, sample.point_forces, sample.depth)
+        state = (sample.coordinates[0], sample.point_forces[0], float(sample.depth[0]))
         assert run.station_deflection[row] == pytest.approx(plant.deflection(*state, run.arc_length), rel=1e-13, abs=1e-16)
         assert run.deflection(tip, 2)[row] == pytest.approx(plant.deflection(*state, tip, 2), rel=1e-13, abs=1e-14)
         assert run.tip_angle[row] == pytest.approx(plant.deflection(*state, tip, 1)[0], rel=1e-13)
         assert run.hub_angle[row] == pytest.approx(plant.deflection(*state, hub, 1)[0], rel=1e-13, abs=1e-16)
-        assert run.tissue_force[row] == sample.tissue_force and run.time[row] == sample.time
-        assert np.array_equal(run.guide_force[row], sample.guide_force)
+        assert run.tissue_force[row] == sample.tissue_force[0] and run.time[row] == sample.time[0]
+        assert np.array_equal(run.guide_force[row], sample.guide_force[0])
     assert np.ptp(run.tip_deflection) > 0.0
 
 

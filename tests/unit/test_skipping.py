@@ -3,15 +3,15 @@ import pytest
 from scipy.linalg import eigh
 
 from fem_needle import FiniteElementNeedle, banded, simulate
+from fem_needle.dynamics.engine import Engine
+from fem_needle.dynamics.run import Integration, without_inertia
 from fem_needle.exact import natural_frequencies
 from fem_needle.free_response import natural_frequencies as computed_frequencies
 from fem_needle.free_response import ringing
 from fem_needle.inertia_effect import inertia_effect
-from fem_needle.legs import march as leg_loop
 from fem_needle.motion import shortest_period
 from fem_needle.scene import Guide, Initial, Insertion, Layer, Model, Sinusoid, Table, TipLoad
-from fem_needle.skipping import RULES, inertia_free_stepper, unneeded_terms
-from fem_needle.steppers import DynamicStepper, StaticStepper
+from fem_needle.skipping import RULES, unneeded_terms
 from tests.consistency.scenes import BUZZ, DAMPED, GEL, held, moving, profile, relative, scene_of
 
 
@@ -54,10 +54,9 @@ def test_shortest_period():
 
 
 def test_creep_where_the_tissue_is_viscous():
-    assert isinstance(inertia_free_stepper(FiniteElementNeedle(scene_of("entry", held(0.1)), elements=2)), StaticStepper)
-    damped = inertia_free_stepper(FiniteElementNeedle(scene_of("entry", held(0.1), DAMPED), elements=2))
-    assert isinstance(damped, DynamicStepper)
-    assert not damped.inertia
+    assert without_inertia(scene_of("entry", held(0.1))) == Integration("rest")
+    damped = without_inertia(scene_of("entry", held(0.1), DAMPED))
+    assert (damped.kind, damped.steps) == ("creep", True)
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.4])
@@ -190,9 +189,9 @@ def test_every_rule_has_its_test():
 def test_output_is_made_where_it_is_asked_for(monkeypatch):
     """Samples between the outputs are not computed: fewer outputs, fewer of them."""
     counted = []
-    original = leg_loop._sample
-    monkeypatch.setattr(leg_loop, "_sample", lambda *args: counted.append(1) or original(*args))
-    plant = FiniteElementNeedle(MOVING["entry"].with_value("numerics.loop", "compiled"), elements=4)
+    original = Engine._samples
+    monkeypatch.setattr(Engine, "_samples", lambda self, record: counted.extend(record) or original(self, record))
+    plant = FiniteElementNeedle(MOVING["entry"], elements=4)
     for output_step, samples in ((1e-2, 4), (1e-3, 31)):
         counted.clear()
         run = simulate(plant, analysis="dynamic", time_step=1e-3, output_step=output_step)

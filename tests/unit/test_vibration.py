@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from fem_needle import FiniteElementNeedle, SceneError, load_scene, run_scene, simulate
+from fem_needle.dynamics.vibration import needs_no_steps
 from fem_needle.exact import ReleaseFromTipForce
-from fem_needle.modal_stepper import needs_no_steps
 from fem_needle.scene import Guide, Initial, LateralLoad, Layer, Sinusoid, TipLoad
 from reduced_model import AssumedModeNeedle
 from tests.consistency.scenes import GEL, LAYERS, held, moving, scene_of
