@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import StrictBool, StrictStr, model_validator
 
+from fem_needle.errors import SuspiciousValueWarning
 from fem_needle.scene.node_positions import NodePositions
 from fem_needle.scene.part import Mistake, Part, raise_mistakes
 from fem_needle.scene.quantity import Quantity
@@ -150,7 +152,7 @@ class Numerics(Part):
     output_points
         Stations along the needle.
     loop
-        Over the time steps: ``"compiled"`` (numba), ``"numpy"``, or ``"auto"``: compiled where it can be and pays.
+        Of former versions, which had several loops over the time steps: "auto"; other values warn and change nothing.
     """
 
     elements: Annotated[
@@ -172,6 +174,9 @@ class Numerics(Part):
         if self.mesh is not None and self.elements != "auto":
             message = f"a mesh has its own elements (got elements = {self.elements}; allowed one of the two)"
             raise_mistakes("Numerics", [Mistake("mesh", message, self.elements)])
+        if self.loop != "auto":
+            message = f"numerics.loop = '{self.loop}': a setting of former versions; every needle goes through the same steps"
+            warnings.warn(message, SuspiciousValueWarning, stacklevel=2)
         return self
 
 

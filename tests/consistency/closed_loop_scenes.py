@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fem_needle import FiniteElementNeedle, Simulation
-from fem_needle.scene import LateralLoad, Layer, Numerics, Scene, TipLoad
+from fem_needle.scene import LateralLoad, Layer, Scene, TipLoad
 from fem_needle.trajectory import VARIABLES, Trajectory
 from reduced_model import AssumedModeNeedle
 from tests.consistency.scenes import held, scene_of
@@ -36,8 +36,7 @@ def loop_scene(insertion=None, *, kind="hub", layers=VISCOUS, loads=None, durati
     """Return a scene with a tip force and, under ``hub``, a finger."""
     if loads is None:
         loads = [TipLoad(force=0.1), FINGER] if kind == "hub" else [TipLoad(force=0.1)]
-    numerics = Numerics(loop="numpy")
-    return scene_of(kind, insertion or held(0.1), layers, loads, duration=duration, numerics=numerics, **parts)
+    return scene_of(kind, insertion or held(0.1), layers, loads, duration=duration, **parts)
 
 
 def scene_for(name: str, insertion=None, **parts: Any) -> Scene:

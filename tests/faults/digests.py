@@ -31,11 +31,8 @@ def runs():
 
 def more_runs():
     moving = load_scene("bench-m").with_values(SHORT)
-    yield "elements, numpy", of_run(run_scene(moving.with_value("numerics.loop", "numpy"), elements=150))
+    yield "elements", of_run(run_scene(moving, elements=150))
     yield "static", of_run(run_scene(load_scene("thesis"), elements=300, analysis="static", time_step=2.0, output_step=2.0))
-    yield "elements, compiled", of_run(
-        run_scene(load_scene("bench-m").with_values(SHORT | {"numerics.loop": "compiled"}), elements=150)
-    )
     forces = np.linspace(0.05, 0.2, 8)
     for cores in (1, 2):
         many = simulate_many(load_scene("thesis"), {"loads.0.force": forces}, cores=cores)

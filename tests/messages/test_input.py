@@ -90,10 +90,6 @@ CASES = {
         lambda: identify_stiffness(np.zeros((8, 2)), EIGHT, noise_in="displacement"),
         "the compliance matrix cannot be inverted: some force moves nothing",
     ),
-    "a pushed run compiled": (
-        lambda: simulate(FiniteElementNeedle(PUSHED.with_value("numerics.loop", "compiled"), elements=2), time_step=1e-3),
-        r"numerics\.loop: a push decides its motion step by step \(got 'compiled'; allowed 'auto', 'numpy'\)",
-    ),
     "positions that are words": (lambda: checked_positions(["a", "b"]), "is not a list of numbers"),
     "positions that are not finite": (lambda: checked_positions([0.0, np.nan, 0.2]), "holds a position that is not finite"),
     "an empty scene": (lambda: parse_scene(" \n"), "scene: is empty"),

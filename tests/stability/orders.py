@@ -269,17 +269,13 @@ def rows():
     def only(function, *given, cases, **options):
         return [(lambda case=case: function(*given, case, **options)) if case in cases else None for case in CASES]
 
-    numpy, compiled, lossy = {"loop": "numpy"}, {"loop": "compiled"}, {"loop": "numpy", "spectral_radius": 0.5}
-    radau = {"loop": "numpy", "spectral_radius": 0.0}
+    lossy, radau = {"spectral_radius": 0.5}, {"spectral_radius": 0.0}
     inward = CASES[2:]
     return [
-        *((f"collocation, radius 1 (Gauss), {name}", 4, every(stepped, model, **numpy)) for name, model in NAMED.items()),
+        *((f"collocation, radius 1 (Gauss), {name}", 4, every(stepped, model)) for name, model in NAMED.items()),
         *((f"collocation, radius 1/2, {name}", 3, every(stepped, model, **lossy)) for name, model in ENTRY.items()),
         *((f"collocation, radius 0 (Radau), {name}", 3, every(stepped, model, **radau)) for name, model in ENTRY.items()),
-        *((f"compiled loop, radius 1, {name}", 4, every(stepped, model, **compiled)) for name, model in NAMED.items()),
-        ("compiled loop, radius 0, elements, entry", 3, every(stepped, ELEMENTS, spectral_radius=0.0, **compiled)),
-        *((f"creep (Radau), {name}", 3, every(stepped, model, creeping=True, **numpy)) for name, model in ENTRY.items()),
-        ("creep (Radau), compiled, elements, entry", 3, every(stepped, ELEMENTS, creeping=True, **compiled)),
+        *((f"creep (Radau), {name}", 3, every(stepped, model, creeping=True)) for name, model in ENTRY.items()),
         *((f"push: depth and tip, {name}", 4, only(pushed, model, cases=inward)) for name, model in NAMED.items()),
         ("commanded force, elements, hub", 4, only(looped, HUB, cases=CASES[1::2])),
         ("commanded force, modes, hub", 4, only(looped, HUB_MODES, cases=CASES[1::2])),

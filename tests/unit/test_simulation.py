@@ -106,17 +106,17 @@ def needle_that_fails(after=0.05):
 SIX = pytest.approx([0.0, 0.01, 0.02, 0.03, 0.04, 0.05])
 
 
-@pytest.mark.filterwarnings("ignore:overflow")
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("analysis", ["static", "dynamic"])
 def test_a_failure_says_where_and_keeps_what_was_computed(analysis):
     watcher = Watcher()
-    with pytest.raises(ComputationError, match=r"time 0\.05.* s, depth 0\.065.* m failed: the deflection is not finite") as caught:
+    with pytest.raises(ComputationError, match=r"time 0\.05.* s, depth 0\.065.* m failed: .* not finite") as caught:
         simulate(needle_that_fails(), time_step=1e-2, analysis=analysis, output_step=0.01, observer=watcher)
     assert caught.value.partial.time == SIX
     assert watcher.times == SIX
 
 
-@pytest.mark.filterwarnings("ignore:overflow")
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_a_refined_run_that_fails_shows_what_it_has():
     watcher = Watcher()
     with pytest.raises(ComputationError, match="not finite") as caught:
@@ -185,14 +185,13 @@ def test_energies_that_miss_under_rigid_guides_advise_damping(stiffness, radius,
     assert ("spectral_radius = 0.8 calms rigid guides" in warning) is is_advised
 
 
-@pytest.mark.parametrize("loop", ["numpy", "auto"])
 @pytest.mark.parametrize(("analysis", "damping"), [("static", 0.0), ("quasi-static", 0.0), ("quasi-static", 50.0)])
-def test_forces_on_a_needle_without_inertia_sum_to_zero_under_rigid_guides(analysis, damping, loop):
+def test_forces_on_a_needle_without_inertia_sum_to_zero_under_rigid_guides(analysis, damping):
     """However long the steps: a guide's force is that of the instant. What viscosity takes at the start is an extrapolation."""
     layers = (Layer(foundation_modulus=5e3, damping=damping),)
     support = {"guides": [Guide(position=-0.0123), Guide(position=-0.04, stiffness=500.0)]}
     scene = scene_of("hub", moving(0.05, 0.05, 0.1), layers, [TipLoad(force=0.1)], support=support, duration=None)
-    run = simulate(plant(scene.with_value("numerics.loop", loop)), time_step=0.1, analysis=analysis, output_step=0.1)
+    run = simulate(plant(scene), time_step=0.1, analysis=analysis, output_step=0.1)
     forces = [run.hub_force, run.tissue_force, *run.guide_force.T, np.full(run.time.shape, 0.1)]
     assert np.max(np.abs(sum(forces)[1 if damping else 0 :])) < 1e-9
     assert np.ptp(run.guide_force[:, 0]) > 0.01

@@ -70,7 +70,7 @@ def test_flexibility_and_stiffness_are_the_same_equations(name, degree):
 @pytest.mark.parametrize("elements", [40, 10_000])
 def test_the_bending_energy_keeps_its_digits(elements):
     """At rest the energies are half the work of the load: w F / 2."""
-    scene = load_scene("bench-s").with_value("numerics.loop", "numpy")
+    scene = load_scene("bench-s")
     run = run_scene(scene, elements=elements, output_step=1.0)
     energy = run.bending_energy[0] + run.tissue_energy[0]
     assert energy == pytest.approx(0.5 * 0.1 * run.tip_deflection[0], rel=1e-9)
