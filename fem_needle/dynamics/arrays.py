@@ -12,46 +12,33 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, config
+from numba.core import config
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array, populate_array
 from numpy.typing import NDArray
+
+from fem_needle.dynamics.rows import TABLE, Rows, rows_value
 
 TABLE_COLUMNS = 6  # address and up to five sizes
 
 
 def _lookup(kind: Any, c_type: Any, dimensions: int) -> Any:
     """Return the function (table, name) -> array of some number type and number of axes."""
-    array_type = types.Array(kind, dimensions, "C")
+    rows_type = Rows(kind, dimensions)
 
     def typed(context: Any, table: Any, name: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            rows = make_array(signature.args[0])(context, builder, arguments[0])
             word = ir.IntType(64)
-            first = builder.mul(arguments[1], ir.Constant(word, TABLE_COLUMNS))
-            entries = [
-                builder.load(builder.gep(rows.data, [builder.add(first, ir.Constant(word, column))]))
-                for column in range(dimensions + 1)
-            ]
-            size = context.get_abi_sizeof(context.get_data_type(kind))
-            strides: list[Any] = []
-            stride: Any = ir.Constant(word, size)
-            for extent in reversed(entries[1:]):
-                strides.insert(0, stride)
-                stride = builder.mul(stride, extent)
-            found = make_array(array_type)(context, builder)
-            data = builder.inttoptr(entries[0], context.get_value_type(kind).as_pointer())
-            populate_array(
-                found,
-                data=data,
-                shape=cgutils.pack_array(builder, entries[1:]),
-                strides=cgutils.pack_array(builder, strides),
-                itemsize=ir.Constant(word, size),
-                meminfo=None,
-            )
-            return found._getvalue()
+            first = context.cast(builder, arguments[0], signature.args[0], TABLE)
+            row = builder.gep(first, [builder.mul(arguments[1], ir.Constant(word, TABLE_COLUMNS))], inbounds=True)
+            columns = (builder.gep(row, [ir.Constant(word, column)], inbounds=True) for column in range(dimensions + 1))
+            address, *sizes = (builder.load(column) for column in columns)
+            steps = sizes[-1:]
+            for size in reversed(sizes[1:-1]):
+                steps.insert(0, builder.mul(size, steps[0]))
+            data = builder.inttoptr(address, context.get_value_type(kind).as_pointer())
+            return rows_value(context, builder, rows_type, data, sizes, steps)
 
-        return array_type(table, types.int64), generate
+        return rows_type(table, types.int64), generate
 
     def looked_up(table: NDArray[np.int64], name: int) -> NDArray[Any]:
         """Return the array, in Python."""

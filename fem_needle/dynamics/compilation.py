@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from fem_needle.dynamics import notice
 from fem_needle.dynamics.haste import hastened
 from fem_needle.dynamics.linking import EntranceCompiler, InnerCompiler
+from fem_needle.dynamics.rows import TABLE
 
 # Sums may be reordered; NaN and infinity keep their meaning, by which a failed step is found.
 _ARITHMETIC: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}}
@@ -40,11 +41,16 @@ def inner(function: Callable[..., Any]) -> Any:
     compiled = njit(**_INNER)(function)
     if not config.DISABLE_JIT:  # type: ignore[attr-defined]
         template = compiled.get_call_template
-        compiled.get_call_template = lambda args, kws: template(tuple(map(types.unliteral, args)), kws)
+        compiled.get_call_template = lambda args, kws: template(tuple(map(_handed_on, args)), kws)
     return compiled
 
 
-stage = inner
+stage = inner  # of a function that has one caller
+
+
+def _handed_on(argument: Any) -> Any:
+    """Return the type as which an argument is taken: no constant, and of a table only where it is."""
+    return TABLE if argument == _TABLE else types.unliteral(argument)
 
 
 def entrance(what: str, functions: int) -> Callable[[Callable[..., Any]], Entrance]:

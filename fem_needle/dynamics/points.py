@@ -113,6 +113,6 @@ def deflection_at(point, rows, first, flexible, q, forces):
 def finite(values):
     """Return whether the sum of values is finite."""
     total = 0.0
-    for value in values:
-        total += value
+    for i in range(len(values)):
+        total += values[i]
     return np.isfinite(total)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.house.source import ROOT
 
-MODULES = ("__init__", "compilation", "haste", "linking", "notice")
+MODULES = ("__init__", "compilation", "haste", "linking", "notice", "rows")
 CALLEE = """
 from fem_needle.dynamics.compilation import inner
 
