@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 
 from fem_needle import ComputationError, FiniteElementNeedle, load_scene, run_scene, simulate, trajectory
+from fem_needle.dynamics.engine import DYNAMIC, Engine
 from fem_needle.dynamics.grid import TimeGrid, output_times, time_grid
+from fem_needle.dynamics.names import FAILED
 from fem_needle.scene import Friction, Guide, Insertion, Layer, Sinusoid, Table, TipLoad
 from tests.consistency.scenes import GEL, LAYERS, held, moving, profile, scene_of
 
@@ -116,14 +118,34 @@ def test_a_failure_says_where_and_keeps_what_was_computed(analysis):
     assert watcher.times == SIX
 
 
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_a_refined_run_that_fails_shows_what_it_has():
+def fail_after(monkeypatch, after):
+    """Let steps with inertia fail that end after some time [s]."""
+    advance = Engine.advance
+
+    def failing(self, intervals, **named):
+        if self.kind != DYNAMIC or intervals[-1, 1] <= after:
+            return advance(self, intervals, **named)
+        return FAILED, advance(self, intervals[intervals[:, 1] <= after], **named)[1]
+
+    monkeypatch.setattr(Engine, "advance", failing)
+
+
+def test_a_refined_run_that_fails_shows_what_it_has(monkeypatch):
+    fail_after(monkeypatch, 0.05)
     watcher = Watcher()
     with pytest.raises(ComputationError, match="not finite") as caught:
-        simulate(needle_that_fails(), time_step="auto", analysis="dynamic", output_step=0.01, observer=watcher)
+        simulate(plant(), time_step="auto", analysis="dynamic", output_step=0.01, observer=watcher)
     assert len(watcher.times) > 1 and set(watcher.times) <= set(caught.value.partial.time)
     assert watcher.times[-1] == caught.value.partial.time[-1] <= 0.05
     assert len(watcher.chosen) == 1
+
+
+def test_a_refined_run_that_fails_before_its_first_sample_has_nothing_to_show(monkeypatch):
+    monkeypatch.setattr(Engine, "advance", lambda self, intervals, **named: (FAILED, ()))
+    watcher = Watcher()
+    with pytest.raises(ComputationError, match="not finite") as caught:
+        simulate(plant(), time_step="auto", analysis="dynamic", output_step=0.01, observer=watcher)
+    assert caught.value.partial is None and watcher.times == []
 
 
 def test_settings_of_run_scene_override_those_of_the_scene():
