@@ -15,8 +15,6 @@ RANKS = {
     "display": 0,
     "frames": 0,
     "gauss": 0,
-    "tables": 0,
-    "table_terms": 1,
     "shapes": 2,
     "path": 0,
     "piecewise": 0,
@@ -48,9 +46,7 @@ RANKS = {
     # parts of a model, and what needs only the protocol
     "axial": 3,
     "foundation": 3,
-    "foundation_terms": 4,
     "beam_matrices": 4,
-    "beam_table": 5,
     "beam_needle": 6,
     "loads": 3,
     "free_response": 3,
@@ -60,21 +56,12 @@ RANKS = {
     "motion": 5,
     "statics": 4,
     "rounding": 5,
-    # time: stages, ledger, steps, the loop; no mesh
+    # time: matrices at an instant, ledger, the kernel; no mesh
     "stages": 6,
-    "jumps": 6.5,
     "ledger": 7,
     "initial": 8,
-    "steppers": 8,
     "samples": 9,
-    "modal_stepper": 9,
-    "pushing": 10,
-    "march": 10,
-    "pushed_march": 11,
-    "compiled": 2,
     "dynamics": 8.5,
-    "legs": 11,
-    "loops": 12,
     "skipping": 9,
     "inertia_effect": 11,
     "trajectory": 11,
@@ -152,7 +139,7 @@ def test_every_room_has_a_rank_and_every_rank_a_room():
 
 def test_a_room_imports_only_rooms_of_lower_rank():
     found = {(room(here), room(name)) for here, name in imports("fem_needle")}
-    assert ("march", "steppers") in found  # the search finds imports at all
+    assert ("run_job", "dynamics") in found  # the search finds imports at all
     assert {pair for pair in found - LATE if RANKS[pair[0]] <= RANKS.get(pair[1], -1)} == set()
 
 

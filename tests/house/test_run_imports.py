@@ -11,5 +11,5 @@ def test_a_run_loads_no_reader_of_its_results(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     modules = loaded("run", "thesis", "--set", "insertion.final_depth=0.03", "--output-step", "0.5", "--elements", "4")
     assert {"scipy", "h5netcdf"} <= modules
-    assert not modules & {"xarray", "pyvista", "vtk", "vtkmodules", "meshio", "matplotlib", "numba"}
+    assert not modules & {"xarray", "pyvista", "vtk", "vtkmodules", "meshio", "matplotlib"}
     assert not modules & {"scipy.optimize", "scipy.integrate", "scipy.interpolate", "scipy.stats", "scipy.signal"}
