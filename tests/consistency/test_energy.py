@@ -256,3 +256,24 @@ def test_let_go_from_a_guide(stiffness):
     start = {"initial": {"shape": "tip-displaced", "tip_deflection": 1e-3}}
     case = scene("hub", held(0.08), DAMPED, [TipLoad(force=0.0)], support=guides, **start)
     assert residual_of(case, "dynamic") < 1e-6
+
+
+def test_a_bevel_over_an_interface():
+    """Its force jumps with the modulus: what it does while it jumps belongs to the loads. Formerly 0.24, whatever the step."""
+    layers = (Layer(end=0.03, foundation_modulus=3e3, damping=2.0), Layer(start=0.03, foundation_modulus=15e3, damping=3.0))
+    case = scene("hub", moving(0.4, 0.01, 0.04), layers, [TipLoad(bevel_coefficient=3e-5)]).with_value("run.duration", 0.08)
+    assert residual_of(case, "dynamic", 1e-4, elements=8) < 2e-5
+    assert residual_of(case, "dynamic", 2.5e-5, elements=8) < 1e-7
+
+
+@pytest.mark.parametrize("kind", ["entry", "hub"])
+def test_a_cut_path_on_many_elements(kind):
+    """The tip that cuts is solved for with the step: nothing is repeated that might not converge (formerly at 40 elements)."""
+    case = scene_of(kind, moving(0.2, 0.02, 0.1), ELASTIC, PUSH, tissue={"rest_line": "cut-path"}, duration=0.4)
+    runs = [
+        simulate(FiniteElementNeedle(case, elements=n), time_step=5e-3, analysis="quasi-static", output_step=0.1)
+        for n in (20, 40, 80)
+    ]
+    tips = np.array([run.tip_deflection[-1] for run in runs])
+    assert np.max(np.abs(tips / tips[-1] - 1.0)) < 1e-6
+    assert max(run.summary["relative_energy_residual"] for run in runs) < 1e-6
