@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from time import perf_counter
@@ -32,7 +33,7 @@ _ENTRANCE = _ARITHMETIC | {"_nrt": False, "no_cfunc_wrapper": True, "nogil": Tru
 
 _TABLE = types.Array(types.int64, 2, "C")
 _FUNCTIONS_SHARE = 0.75  # of the time goes into the functions, what is left into the whole that they become
-_SECONDS_PER_FUNCTION = 0.12
+_SECONDS_PER_FUNCTION = 0.1
 _DIGITS = 12  # of what tells sources apart
 
 
@@ -178,11 +179,17 @@ def _kept(function: Callable[..., Any], stamp: str) -> Any:
 
 def _stamp(function: Callable[..., Any]) -> str:
     """Return a text that is another for other sources, of which numba itself sees one, and where indices are checked."""
+    digest = _digest(function.__module__.rpartition(".")[0])
+    return f"_checked_{digest}" if config.BOUNDSCHECK else f"_{digest}"  # type: ignore[attr-defined]
+
+
+@cache
+def _digest(package: str) -> str:
     digest = hashlib.sha256()
-    sources = (path for path in files(function.__module__.rpartition(".")[0]).iterdir() if path.name.endswith(".py"))
+    sources = (path for path in files(package).iterdir() if path.name.endswith(".py"))
     for path in sorted(sources, key=lambda path: path.name):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return f"_{'checked_' if config.BOUNDSCHECK else ''}{digest.hexdigest()[:_DIGITS]}"  # type: ignore[attr-defined]
+    return digest.hexdigest()[:_DIGITS]
 
 
 def _remove(folder: Path | None, pattern: str, but: str = "/") -> None:

@@ -42,6 +42,12 @@ class Warmed:
         return f"{self.what}: there already, loaded in {self.seconds:.1f} s from {self.folder}"
 
 
+def prepare() -> None:
+    """Load or compile all entrances where that has not been done yet: before processes start, which would all compile them."""
+    for entrance in ENTRANCES:
+        entrance.prepare()
+
+
 def warm() -> Iterator[Warmed]:
     """Prepare all entrances, one after the other.
 

@@ -11,7 +11,7 @@ import pytest
 from fem_needle.cli.waiting import compilations_shown
 from fem_needle.dynamics import notice
 from fem_needle.dynamics.compilation import Entrance
-from fem_needle.dynamics.warming import ENTRANCES, warm
+from fem_needle.dynamics.warming import ENTRANCES, prepare, warm
 from tests.house.source import ROOT, python_files
 
 FUNCTIONS_MISSED = 0.2  # of those that an entrance expects
@@ -81,5 +81,6 @@ def test_a_cold_entrance_compiles_as_many_functions_as_it_expects(tmp_path, entr
 
 
 def test_warming_tells_what_was_there():
+    prepare()
     assert [done.what for done in warm()] == [entrance.what for entrance in ENTRANCES]
     assert all(done.functions == entrance.compiled for done, entrance in zip(warm(), ENTRANCES, strict=True))

@@ -36,7 +36,7 @@ CALL = """
 import sys
 import numpy as np
 from fem_needle.dynamics.tiny import run_tiny
-print(run_tiny(np.full((3, 6), 4, dtype=np.int64)), run_tiny.compiled)
+print(run_tiny(np.full((3, 6), 4, dtype=np.int64)), "compiled" if run_tiny.compiled else "kept")
 """
 RESULT = 5 + 3 * 10
 
@@ -81,10 +81,10 @@ def small(tmp_path):
 
 def test_an_entrance_is_compiled_once_and_says_so(small):
     first, said = small.run()
-    assert first == [f"{RESULT} 4"]
+    assert first == [f"{RESULT} compiled"]
     assert said == "compiling the tiny loop, once on this machine (some 0 s)\n"
     assert len(small.kept) == 2
-    assert small.run() == ([f"{RESULT} 0"], "")
+    assert small.run() == ([f"{RESULT} kept"], "")
 
 
 def test_another_callee_is_another_kernel(small):
@@ -92,17 +92,17 @@ def test_another_callee_is_another_kernel(small):
     before = small.kept
     (small.room / "callee.py").write_text(CALLEE.replace("value + 1", "value + 2"))
     again, said = small.run()
-    assert again == [f"{6 + 3 * 12} 4"] and "compiling" in said
+    assert again == [f"{6 + 3 * 12} compiled"] and "compiling" in said
     assert len(small.kept) == 2 and not set(small.kept) & set(before)  # nothing is left of what is gone
-    assert small.run() == ([f"{6 + 3 * 12} 0"], "")
+    assert small.run() == ([f"{6 + 3 * 12} kept"], "")
 
 
 def test_code_that_checks_its_indices_is_kept_on_its_own(small):
     small.run()
     checked, said = small.run(NUMBA_BOUNDSCHECK="1")
-    assert checked == [f"{RESULT} 4"] and "compiling" in said
+    assert checked == [f"{RESULT} compiled"] and "compiling" in said
     assert len(small.kept) == 4
-    assert small.run() == ([f"{RESULT} 0"], "")
+    assert small.run() == ([f"{RESULT} kept"], "")
 
 
 @pytest.mark.parametrize("named", [False, True])
@@ -111,22 +111,22 @@ def test_without_a_folder_the_run_goes_on(small, named):
     settings = {"NUMBA_CACHE_DIR": str(small.path / ".cache" / "numba")} if named else {}
     for _ in range(2):
         done, said = small.run(CALL + CALL.splitlines()[-1], **settings)
-        assert done == [f"{RESULT} 4"] * 2
+        assert done == [f"{RESULT} compiled"] * 2
         assert said.count("\n") == 1 and "in every process anew" in said and "NUMBA_CACHE_DIR" in said
 
 
 def test_a_folder_that_cannot_be_read_when_it_is_needed_is_no_error(small):
     spoil = "import fem_needle.dynamics.tiny as t, shutil; shutil.rmtree(t.run_tiny.folder); t.run_tiny.folder.touch()"
     done, said = small.run(f"{spoil}\n{CALL}")
-    assert done == [f"{RESULT} 4"]
+    assert done == [f"{RESULT} compiled"]
     assert "what was kept of the tiny loop in" in said and said.count("\n") == 2
-    assert small.run() == ([f"{RESULT} 0"], "")  # in the user's folder
+    assert small.run() == ([f"{RESULT} kept"], "")  # in the user's folder
 
 
 def test_a_folder_that_cannot_be_written_when_it_is_needed_is_no_error(small):
     spoil = "import numba.core.caching as c\ndef full(*given): raise OSError('disk full')\nc.IndexDataCacheFile.save = full"
     done, said = small.run(f"{spoil}\n{CALL}")
-    assert done == [f"{RESULT} 4"]
+    assert done == [f"{RESULT} compiled"]
     assert said.splitlines()[1].startswith("the tiny loop cannot be kept in") and said.endswith("disk full\n")
 
 
@@ -136,8 +136,8 @@ def test_what_is_kept_and_spoiled_is_made_anew(small, kind):
     for path in small.path.rglob(f"*.{kind}"):
         path.write_bytes(b"spoiled")
     done, said = small.run()
-    assert done == [f"{RESULT} 4"] and "cannot be read" in said and "compiling" in said
-    assert small.run() == ([f"{RESULT} 0"], "")
+    assert done == [f"{RESULT} compiled"] and "cannot be read" in said and "compiling" in said
+    assert small.run() == ([f"{RESULT} kept"], "")
 
 
 def test_a_named_folder_is_used(small):
@@ -157,10 +157,10 @@ def call():
 threads = [Thread(target=call) for _ in range(4)]
 for thread in threads: thread.start()
 for thread in threads: thread.join()
-print(found, run_tiny.compiled)
+print(found)
 """
     done, said = small.run(code)
-    assert done == [f"{[RESULT] * 4} 4"] and said.count("compiling") == 1
+    assert done == [str([RESULT] * 4)] and said.count("compiling") == 1
 
 
 def test_settings_of_the_caller_come_back(small):
@@ -204,11 +204,11 @@ with notice.watched(lambda what, share: print(what, round(share, 2))):
     done, _ = small.run(code)
     assert done[0] == "tiny loop 0.0" and done[-1] == "tiny loop 1.0"
     shares = [float(line.split()[-1]) for line in done]
-    assert shares == sorted(shares) and len(shares) == 5
+    assert shares == sorted(shares) and len(set(shares)) >= 4
 
 
 def test_uncompiled_nothing_is_compiled(small):
-    assert small.run(NUMBA_DISABLE_JIT="1") == ([f"{RESULT} 0"], "")
+    assert small.run(NUMBA_DISABLE_JIT="1") == ([f"{RESULT} kept"], "")
     assert small.kept == []
 
 
