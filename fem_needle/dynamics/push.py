@@ -22,7 +22,7 @@ from fem_needle.segments import interfaces
 
 Array = NDArray[np.float64]
 
-LANDING = 1e-6  # of a level's depth: a located event that misses it by more is none
+LANDING = 1e-6  # of the depth: a located event that misses its level by more is none
 LAYER_SIDE = 1e-11  # of the depth: far enough from an interface to be in the layer that the tip moves in
 TIME_RESOLUTION = 1e-9  # of a step: how closely an event's time is found
 STUCK_MARGIN = 10.0  # times |A|: a needle this far below its thresholds stays
@@ -300,7 +300,7 @@ class Push:
             found, found_time = short, short_time
         if found is None:
             return None
-        if kind == "reaches" and abs(self._way_of(found) - level) > LANDING * (abs(level) + abs(self._way_of(found))):
+        if kind == "reaches" and abs(self._way_of(found) - level) > LANDING * max(abs(level), self.depth):
             return None
         return found_time
 

@@ -10,7 +10,8 @@ from tests.stability import orders
 DOCUMENT = Path(__file__).parents[2] / "docs" / "robustness.md"
 ROWS = {name: (order, cells) for name, order, cells in orders.rows()}
 QUICK = (
-    "compiled loop, radius 1, elements, entry",
+    "collocation, radius 1 (Gauss), elements, entry",
+    "collocation, radius 0 (Radau), modes, entry",
     "commanded force, elements, hub",
     "loop over many runs, vibrations",
 )

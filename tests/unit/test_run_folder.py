@@ -17,6 +17,7 @@ import xarray
 
 from fem_needle import FiniteElementNeedle, Insertion, Scene, Support, load_scene, run_scene
 from fem_needle.atomic_file import json_bytes
+from fem_needle.dynamics import engine
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.run_folder import RunFolderWriter, load_run, save_run
 from fem_needle.run_target import RunTarget
@@ -26,6 +27,12 @@ from tests.unit.scene.examples import entry_data, hub_scene
 
 HOLD = Insertion(kind="speed", initial_depth=0.02, speed=0.01, final_depth=0.06)  # 4 s
 STATIC = {"numerics": {"analysis": "static", "elements": 8, "time_step": 0.5, "output_step": 0.5, "output_points": 11}}
+
+
+@pytest.fixture(autouse=True)
+def _short_calls(monkeypatch):
+    """Let the kernel give its samples one by one: so short a run would be over in one call."""
+    monkeypatch.setattr(engine, "NUMBERS_OF_A_CALL", 1)
 
 
 def short_scene(**changes) -> Scene:
