@@ -60,6 +60,17 @@ class Part(JITCodeLibrary):
         self._ensure_finalized()
         return 0
 
+    def alone(self) -> Any:
+        """Return the function's module."""
+        return super()._get_module_for_linking()
+
+    def _get_module_for_linking(self) -> Any:
+        """Return the function's module with all parts, to a library that is no `Whole`."""
+        module = self.alone().clone()
+        for part in self.parts:
+            module.link_in(_alone(part), preserve=True)
+        return module
+
 
 class Whole(JITCodeLibrary):
     """An entrance with everything that it calls."""
@@ -67,6 +78,28 @@ class Whole(JITCodeLibrary):
     def add_linking_library(self, library: Any) -> None:
         """Link a library and all its parts."""
         _add_new(self._linking_libraries, library)
+
+    def finalize(self) -> None:
+        """Link each part once, optimize and make machine code."""
+        self._linking_libraries = [_Alone(one) if isinstance(one, Part) else one for one in self._linking_libraries]
+        super().finalize()
+
+
+class _Alone:
+    """A part that gives itself to the linker without what it calls."""
+
+    def __init__(self, part: Part) -> None:
+        self._part = part
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._part, name)
+
+    def _get_module_for_linking(self) -> Any:
+        return self._part.alone()
+
+
+def _alone(library: Any) -> Any:
+    return library.alone() if isinstance(library, Part) else library._get_module_for_linking()
 
 
 def _add_new(libraries: list[Any], library: Any) -> None:

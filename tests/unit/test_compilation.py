@@ -212,6 +212,15 @@ def test_uncompiled_nothing_is_compiled(small):
     assert small.kept == []
 
 
+def test_other_compiled_code_may_call_what_is_compiled_into_callers(small):
+    code = """
+from numba import njit
+from fem_needle.dynamics.callee import doubled
+print(njit(lambda value: doubled(value) + doubled(2 * value))(4))
+"""
+    assert small.run(code) == (["28"], "")
+
+
 def test_a_table_of_another_kind_is_refused(small):
     code = """
 import numpy as np
