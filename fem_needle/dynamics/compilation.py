@@ -92,6 +92,10 @@ class Entrance:
             self.prepare()
         return int(self._run(table))
 
+    def __reduce__(self) -> str:
+        """Be the same in copies and in other processes."""
+        return self.__name__
+
     @property
     def folder(self) -> Path | None:
         """Where it is kept, None where it can be kept nowhere."""

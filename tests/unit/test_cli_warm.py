@@ -2,9 +2,11 @@
 
 import io
 import os
+import pickle
 import re
 import subprocess
 import sys
+from copy import deepcopy
 
 import pytest
 
@@ -64,6 +66,11 @@ def test_nobody_watches_what_is_over(monkeypatch):
         notice.done("time loop", 0.5)
     notice.done("time loop", 0.6)
     assert seen == ["inner"]
+
+
+def test_a_copy_of_an_entrance_is_the_entrance():
+    for entrance in ENTRANCES:
+        assert deepcopy(entrance) is entrance and pickle.loads(pickle.dumps(entrance)) is entrance
 
 
 @pytest.mark.slow
