@@ -116,7 +116,7 @@ def set_tip_force(arrays, middle, known, course, forces, force_rates):
     layers, bevel = floats_2(arrays, LAYER), floats_1(arrays, BEVEL)
     modulus, time = 0.0, course[TIME]
     for number in range(layers.shape[0] - 1, -1, -1):
-        if course[SIDE] >= layers[number, LAYER_START] and course[SIDE] < layers[number, LAYER_END]:
+        if course[OWN_SIDE] >= layers[number, LAYER_START] and course[OWN_SIDE] < layers[number, LAYER_END]:
             modulus = layers[number, MODULUS]
     total, total_rate = 0.0, 0.0
     for tip in range(switches[TIPS]):

@@ -354,7 +354,7 @@ def take_step(arrays, t, h, until, is_last, is_output):
     return status
 
 
-@entrance("time loop", 150)
+@entrance("time loop", 185)
 def run_steps(arrays):
     """Take the steps of smooth intervals; returns how it ended (`names`: DONE, FAILED, EVENT, DIVERGED).
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from fem_needle import ComputationError, FiniteElementNeedle, run_scene, solve_static
-from fem_needle.scene import Guide, LateralLoad, Table, TipLoad
+from fem_needle.scene import Guide, LateralLoad, Layer, Table, TipLoad
 from fem_needle.statics import check_force_sum
 from tests.consistency.scenes import GEL, STIFFNESS, held, scene_of
 
@@ -67,3 +67,10 @@ def test_the_surface_carries_the_tip_force_of_a_needle_that_is_hardly_inserted()
     scene = scene_of("entry", held(1e-9), numerics={"analysis": "static"})
     run = run_scene(scene)
     assert run.hub_force == pytest.approx(-0.1) and np.all(run.hub_moment == 0.0)
+
+
+def test_a_bevel_that_is_hardly_inserted_feels_the_layer_at_its_tip():
+    """Matrices are those of the smallest depth, 2e-7 m here; the tip is still in the layer in front of it."""
+    layers = (Layer(end=1e-7, foundation_modulus=1e3), Layer(start=1e-7, foundation_modulus=5e4))
+    scene = scene_of("entry", held(5e-8), layers, (TipLoad(bevel_coefficient=1e-5),), numerics={"analysis": "static"})
+    assert run_scene(scene).hub_force == pytest.approx(-1e-2)
