@@ -22,6 +22,7 @@ from fem_needle.dynamics.names import (
     AXIAL_STATE,
     BEAM,
     BEAM_GAPS,
+    BENDING,
     BENDING_STIFFNESS,
     CHANGED,
     CLAMP,
@@ -49,7 +50,9 @@ from fem_needle.dynamics.names import (
     KEY,
     KNOWN,
     LATERAL,
+    MASS,
     MATRICES,
+    METHOD,
     NODE_MATRICES,
     NODE_TIPS,
     NUMBER,
@@ -57,6 +60,7 @@ from fem_needle.dynamics.names import (
     PATH_LOAD,
     PATH_LOAD_RATE,
     PIECE_NODES,
+    PLACES,
     POINT_FIRST,
     POINT_ROWS,
     PRESCRIBED,
@@ -66,6 +70,7 @@ from fem_needle.dynamics.names import (
     SCRATCH,
     SHARES,
     SIDES,
+    START,
     STIFFNESSES,
     STRETCH,
     STRIDE,
@@ -182,13 +187,31 @@ def right_side(arrays, h):
 
 
 @inner
-def begin_nodes(arrays):
-    """Set coordinates and velocities at the nodes with the unknowns at zero."""
+def moves_slowly(course, beam, h):
+    """Return whether no coordinate's own vibration goes far in a step: h^2 K_ii < M_ii."""
+    stiff, heavy = h * h / (course[STRETCH] * course[STRETCH] * course[STRETCH]), course[STRETCH]
+    for block in range(beam.shape[0]):
+        for i in range(beam.shape[2]):
+            if stiff * beam[block, BENDING, i, i] > heavy * beam[block, MASS, i, i]:
+                return False
+    return True
+
+
+@inner
+def begin_nodes(arrays, h):
+    """Set coordinates and velocities at the nodes with the unknowns at zero.
+
+    In short steps the needle goes on as it moves. Its factors' rounding, the same in every step, would otherwise act on the whole
+    advance and not on what forces change of it: energy would grow or shrink with the number of steps. Where a vibration goes far,
+    its velocity times the step is larger than its advance, and rounds more.
+    """
     known, rates, clamp = floats_2(arrays, KNOWN), floats_2(arrays, RATES), floats_3(arrays, CLAMP)
-    start = floats_3(arrays, LATERAL)[0]
+    start, places = floats_3(arrays, LATERAL)[0], floats_2(arrays, METHOD)[PLACES]
+    moves = integers_1(arrays, SWITCH)[INERTIA] != 0 and moves_slowly(floats_2(arrays, COURSES)[0], floats_5(arrays, BEAM)[0], h)
     for s in range(2):
         for i in range(known.shape[1]):
-            known[s, i], rates[s, i] = start[0, i], 0.0
+            rates[s, i] = rates[START, i] if moves else 0.0
+            known[s, i] = start[0, i] + places[s] * h * rates[s, i]
         for i in range(integers_1(arrays, SWITCH)[PRESCRIBED]):
             known[s, i], rates[s, i] = clamp[s, 0, i], clamp[s, 1, i]
 
@@ -288,7 +311,7 @@ def solve_nodes(arrays, h):
     known, rates, forces = floats_2(arrays, KNOWN), floats_2(arrays, RATES), floats_2(arrays, FORCES)
     answer, held, guides = floats_1(arrays, ANSWER), floats_2(arrays, GUIDE_FORCES), switches[GUIDES]
     factor_step(arrays, h)
-    begin_nodes(arrays)
+    begin_nodes(arrays, h)
     cutting = switches[CUTS] != 0 and course[1, OWN_DEPTH] > floats_1(arrays, AXIAL_STATE)[DEEPEST]
     if switches[CUTS]:
         set_path_loads(arrays, cutting)

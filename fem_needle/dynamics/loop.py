@@ -80,6 +80,7 @@ from fem_needle.dynamics.names import (
     PUSH_WORK,
     R_FRICTION,
     R_PUSH,
+    RATES,
     RECORDS,
     ROUNDS,
     S_MOMENTUM,
@@ -146,6 +147,7 @@ def begin_step(arrays, t, h):
             copy_row(clamp[END, row], clamp[START, row])
         copy_row(floats_2(arrays, FORCES)[END], floats_2(arrays, FORCES)[START])
         copy_row(floats_2(arrays, KNOWN)[END], floats_2(arrays, KNOWN)[START])
+        copy_row(floats_2(arrays, RATES)[END], floats_2(arrays, RATES)[START])
         copy_row(floats_2(arrays, INSTANT_SUMS)[END], floats_2(arrays, INSTANT_SUMS)[START])
     else:
         at, middle = START, t + 0.5 * h
@@ -354,7 +356,7 @@ def take_step(arrays, t, h, until, is_last, is_output):
     return status
 
 
-@entrance("time loop", 185)
+@entrance("time loop", 186)
 def run_steps(arrays):
     """Take the steps of smooth intervals; returns how it ended (`names`: DONE, FAILED, EVENT, DIVERGED).
 

@@ -13,7 +13,7 @@ behind it, A' = A + G_22,
 
 Nothing is divided by e: rounding costs an element one digit of the deflection, not (l / e)^3 of them. ``width`` unknowns stand
 for each coordinate: 1 of an equilibrium, 2 (the stages) of a time step; unknown s of a coordinate is at width - 1 - s. Matrices
-of nodes are small their size is known to the compiler: functions are made for a width. No pivots: docs/theory.md, "In one call".
+of nodes are small, their size is known to the compiler: functions are made for a width. No pivots: docs/theory.md, "In one call".
 """
 
 from __future__ import annotations
