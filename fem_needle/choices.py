@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.dynamics.push import run_limits
+from fem_needle.dynamics.rests import tips_at_rest
 from fem_needle.dynamics.vibration import needs_no_steps, vibrating_tips
 from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
@@ -20,7 +21,6 @@ from fem_needle.motion import PUSH_SLACK, depth_law, lateral_values, run_duratio
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene, as_function
 from fem_needle.skipping import INERTIA_SHARE, Skipped, unneeded_terms
-from fem_needle.statics import solve_static
 
 Array = NDArray[np.float64]
 
@@ -136,7 +136,7 @@ def longest_period(plant: Plant) -> float:
 
 def static_tips(plant: Plant, count: int = PILOT_INSTANTS) -> Array:
     """Return the static tip deflections [m] at the `instants`."""
-    return np.array([solve_static(plant, depth=depth, time=time).tip_deflection for time, depth in instants(plant, count)])
+    return tips_at_rest(plant, instants(plant, count))
 
 
 def loaded_times(scene: Scene, duration: float, count: int) -> list[float]:

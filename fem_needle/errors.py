@@ -30,7 +30,7 @@ class ComputationError(NeedleError, RuntimeError):
     Attributes
     ----------
     partial
-        The trajectory of what was computed before, or None.
+        What was computed before, such as a trajectory, or None.
     """
 
     partial: Any = None

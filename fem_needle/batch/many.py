@@ -3,37 +3,25 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
-from itertools import pairwise
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fem_needle.batch import columns as at
-from fem_needle.batch.rows import can_vary, depths_of, row_of, rows_of, times_of
-from fem_needle.batch.spectrum import Spectrum, is_uniform, spectrum_of
-from fem_needle.choices import choose
-from fem_needle.collocation import collocation
 from fem_needle.display import Card, Shown, in_millimeters
-from fem_needle.dynamics.grid import time_grid
-from fem_needle.dynamics.run import integration_of, run_samples
-from fem_needle.errors import ComputationError, SceneError
+from fem_needle.dynamics import warming
+from fem_needle.errors import ComputationError, SceneError, SuspiciousValueWarning
 from fem_needle.models import build_plant
-from fem_needle.sample_arrays import Samples, joined
 from fem_needle.scene import Scene
-from fem_needle.simulation import run_scene
+from fem_needle.simulation import run_scene, simulate
 from fem_needle.threads import one_thread
+from fem_needle.trajectory import VARIABLES
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
-
-PIECES = 16  # of the work, for each core
-STEPS_PER_PERIOD = 12  # of the loads, to begin with
-MOST_LEVELS = 9
-FIRST = (12, 4)  # elements and moving vibrations to begin with
-LAST = (96, 32)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,6 +36,8 @@ class ManyRuns(Shown):
         Largest estimated tip error of all runs, relative to the run's largest tip deflection; NaN where settings are given.
     steps
         Time steps of all runs together.
+    variables
+        What else was asked for, by its name in ``series.nc``, as the tips; SI.
     """
 
     time: Array
@@ -55,6 +45,7 @@ class ManyRuns(Shown):
     tip_deflection: Array
     error_estimate: float
     steps: int
+    variables: dict[str, Array] = field(default_factory=dict)
 
     def _card(self) -> Card:
         tips = self.final_tip_deflection
@@ -84,10 +75,12 @@ def simulate_many(
     scenes: Scene | Sequence[Scene],
     parameters: Mapping[str, ArrayLike] | None = None,
     *,
+    variables: Sequence[str] = (),
     time_step: float | None = None,
-    vibrations: int | None = None,
-    cores: int | None = None,
+    threads: int | None = None,
     progress: Progress | None = None,
+    cores: int | None = None,
+    vibrations: int | None = None,
 ) -> ManyRuns:
     """Compute the tips of many runs.
 
@@ -97,60 +90,60 @@ def simulate_many(
         Scenes, or one scene whose values ``parameters`` vary.
     parameters
         Arrays of equal length by path, one value for each run: ``{"loads.0.force": forces, "insertion.speed": speeds}``.
+    variables
+        Names of more variables over time of ``series.nc`` to return of every run, such as ``"push_force"``.
     time_step
-        Largest step [s] of all runs; default: what each scene says, or what its tolerance needs.
-    vibrations
-        Number of moving vibrations of uniform runs; default: doubled, with halved steps, until all runs agree to half the first
-        scene's tolerance.
-    cores
-        How many to use; default: all.
+        Largest step [s] of all runs; default: what every scene says, chosen for each run from its tolerance where it says
+        nothing.
+    threads
+        How many to use; default: as many as there are cores.
     progress
-        Is told which fraction of the runs is done; from 0 again where they are computed with finer settings.
+        Is told which fraction of the runs is done.
+    cores, vibrations
+        Of former versions: ``cores`` is ``threads``, ``vibrations`` changes nothing.
 
     Returns
     -------
     ManyRuns
-        In the order of the scenes, the same whatever the number of cores.
+        In the order of the scenes, the same whatever the number of threads.
 
     Raises
     ------
     SceneError
-        If a path or a value is impossible, or there is nothing to compute.
+        If a path, a value or a variable's name is impossible, or there is nothing to compute.
+    ComputationError
+        Of a run that fails, with its number; ``error.partial`` has the runs that were finished.
 
     Notes
     -----
-    Runs of the uniform kind (support ``entry``, one layer, constant speed, tip forces that are constant or a sinusoid) that share
-    needle length and model go through one compiled loop, without any Python for a run. All others are run one by one, in as many
-    threads as there are cores: as they are where a scene gives its mesh and its time step, as `run_scene` runs them where these
-    are to be chosen.
+    Where a scene gives its mesh and its time step, nothing but that run is computed; otherwise they are chosen as `run_scene`
+    does, which takes trial runs. Threads share one interpreter: they help as far as runs spend their time in compiled steps.
     """
-    told = progress or _nobody
-    workers = cores or os.cpu_count() or 1
-    if isinstance(scenes, Scene):
-        given = parameters or {}
-        if is_uniform(scenes) and can_vary(scenes, list(given)):
-            return _compiled(scenes, rows_of(scenes, given), time_step, vibrations, workers, told)
-        return _one_by_one(_stepped(_varied(scenes, given), time_step), workers, told)
-    if parameters is not None:
-        raise SceneError("parameters: vary one scene (got several; allowed one scene with parameters, or scenes alone)")
-    many = list(scenes)
-    if not many:
-        raise SceneError("scenes: nothing to compute (got 0; allowed 1 or more)")
-    if all(is_uniform(scene) and _shares(scene, many[0]) for scene in many):
-        return _compiled(many[0], np.array([row_of(scene) for scene in many]), time_step, vibrations, workers, told)
-    return _one_by_one(_stepped(many, time_step), workers, told)
+    for name, value in (("cores", cores), ("vibrations", vibrations)):
+        if value is not None:
+            instead = "threads is its name now" if name == "cores" else "every run has all that its model has"
+            warnings.warn(f"{name}: an argument of former versions; {instead}", SuspiciousValueWarning, stacklevel=3)
+    for name in variables:
+        if name not in VARIABLES:
+            raise SceneError(f"variables: unknown (got {name!r}; allowed {', '.join(VARIABLES)})")
+    many = _all(scenes, parameters)
+    if time_step is not None:
+        many = [scene.with_value("numerics.time_step", time_step) for scene in many]
+    return _gathered(many, tuple(variables), threads or cores or os.cpu_count() or 1, progress or _nobody)
 
 
 def _nobody(fraction: float) -> None:
     """Tell nobody."""
 
 
-def _stepped(scenes: list[Scene], time_step: float | None) -> list[Scene]:
-    return scenes if time_step is None else [scene.with_value("numerics.time_step", time_step) for scene in scenes]
-
-
-def _shares(scene: Scene, first: Scene) -> bool:
-    return scene.model == first.model and scene.needle.length == first.needle.length
+def _all(scenes: Scene | Sequence[Scene], parameters: Mapping[str, ArrayLike] | None) -> list[Scene]:
+    if isinstance(scenes, Scene):
+        return _varied(scenes, parameters or {})
+    if parameters is not None:
+        raise SceneError("parameters: vary one scene (got several; allowed one scene with parameters, or scenes alone)")
+    if not scenes:
+        raise SceneError("scenes: nothing to compute (got 0; allowed 1 or more)")
+    return list(scenes)
 
 
 def _varied(scene: Scene, parameters: Mapping[str, ArrayLike]) -> list[Scene]:
@@ -158,126 +151,63 @@ def _varied(scene: Scene, parameters: Mapping[str, ArrayLike]) -> list[Scene]:
     counts = sorted({len(values) for values in columns.values()})
     if len(counts) > 1:
         raise SceneError(f"parameters: as many values each (got {counts}; allowed one number of them)")
-    return [scene.with_values(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)] or [scene]
-
-
-def _compiled(
-    scene: Scene, rows: Array, time_step: float | None, vibrations: int | None, cores: int, progress: Progress
-) -> ManyRuns:
-    """Compute uniform runs, with finer and finer settings where none are given."""
-    times = times_of(rows)
-    elements, moving = FIRST
-    step = min(float(np.min(rows[:, at.OUTPUT_STEP])), _shortest_period(rows) / STEPS_PER_PERIOD)
-    is_given = time_step is not None and vibrations is not None
-    coarser, estimate = None, np.nan
-    for _ in range(MOST_LEVELS):
-        spectrum = _spectrum(scene, LAST[0] if is_given else elements, moving if vibrations is None else vibrations)
-        tips, steps = _tips(rows, times, spectrum, step if time_step is None else time_step, cores, progress)
-        if is_given:
-            break
-        if coarser is not None:
-            estimate = _difference(coarser, tips)
-            if estimate <= 0.5 * scene.numerics.tolerance:
-                break
-        coarser, step = tips, step / 2
-        elements, moving = min(2 * elements, LAST[0]), min(2 * moving, LAST[1])
-    return ManyRuns(times, depths_of(rows, times), tips, estimate, steps)
-
-
-def _shortest_period(rows: Array) -> float:
-    """Return the shortest period [s] of all runs' forces, infinity where none swings."""
-    fastest = float(np.max(np.abs(rows[:, at.FREQUENCY]) * (rows[:, at.AMPLITUDE] != 0.0)))
-    return 2 * np.pi / fastest if fastest else np.inf
-
-
-def _difference(coarser: Array, finer: Array) -> float:
-    """Return the largest difference of two tips of a run, relative to its largest tip deflection."""
-    scale = np.nanmax(np.abs(finer), axis=1)
-    return float(np.max(np.nanmax(np.abs(coarser - finer), axis=1) / np.where(scale > 0.0, scale, 1.0)))
-
-
-def _spectrum(scene: Scene, elements: int, moving: int) -> Spectrum:
-    """Return the spectrum of a scene's model; of finite elements with as many elements as asked, unless the scene says."""
-    moves = scene.numerics.analysis in {"auto", "dynamic"}
-    if scene.model.kind == "fem" and scene.numerics.elements == "auto":
-        scene = scene.with_value("numerics.elements", elements)
-    if scene.tissue.layers:  # the rows say how viscous: the matrix of the drag is asked for
-        scene = scene.with_value("tissue.layers.0.damping", 1.0)
-    return spectrum_of(build_plant(scene), moving if moves else 0)
-
-
-def prepared(rows: Array, spectrum: Spectrum, time_step: float) -> Callable[[Array, int, int], int]:
-    """Return what computes some rows (from, to) into an array of tips (runs, outputs) and returns the number of steps."""
-    from fem_needle.batch.loop import compute_runs
-
-    rows, method, count = rows.copy(), collocation(1.0), len(spectrum.convection)
-    rows[:, at.TIME_STEP] = time_step
-    constants = np.stack([method.nodes, *method.inverse, method.end])
-    matrices = (spectrum.convection, spectrum.centrifugal, spectrum.drag)
-
-    def compute(tips: Array, first: int, last: int) -> int:
-        work = (np.zeros((2, count)), np.zeros((2 * count, 2 * count)), np.zeros(2 * count))
-        chosen = rows[first:last]
-        return int(compute_runs(chosen, spectrum.roots, spectrum.tips, *matrices, constants, tips[first:last], *work))
-
-    return compute
-
-
-def _tips(rows: Array, times: Array, spectrum: Spectrum, time_step: float, cores: int, progress: Progress) -> tuple[Array, int]:
-    """Return the tips (runs, outputs) and the number of steps: each core takes one piece of the runs after the other."""
-    compute = prepared(rows, spectrum, time_step)
-    tips = np.full(times.shape, np.nan)
-    edges = np.unique(np.linspace(0, len(rows), min(len(rows), PIECES * cores) + 1).astype(int))
-    steps, done = 0, 0
-    with ThreadPoolExecutor(cores) as pool:
-        waiting = {pool.submit(compute, tips, int(a), int(b)): int(b - a) for a, b in pairwise(edges)}
-        for finished in as_completed(waiting):
-            steps, done = steps + finished.result(), done + waiting[finished]
-            progress(done / len(rows))
-    if not np.array_equal(np.isfinite(tips), np.isfinite(times)):
-        number = int(np.argmax(np.any(np.isfinite(tips) != np.isfinite(times), axis=1)))
-        raise ComputationError(f"run {number} has no finite answer: check its values, or use a smaller time_step")
-    return tips, steps
-
-
-def _one_by_one(scenes: list[Scene], cores: int, progress: Progress) -> ManyRuns:
-    """Run every scene on its own, in threads, the first one before them: compiled code is there when they start."""
-    found = [_one(scenes[0])]
-    progress(1 / len(scenes))
-    with ThreadPoolExecutor(cores) as pool:
-        waiting = [pool.submit(_one, scene) for scene in scenes[1:]]
-        try:
-            for done, finished in enumerate(as_completed(waiting), start=2):
-                finished.result()
-                progress(done / len(scenes))
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-        found.extend(run.result() for run in waiting)
-    columns = np.full((3, len(scenes), max(run.rows.shape[1] for run in found)), np.nan)
-    for number, run in enumerate(found):
-        columns[:, number, : run.rows.shape[1]] = run.rows
-    return ManyRuns(
-        columns[0], columns[1], columns[2], float(np.max([run.error for run in found])), sum(run.steps for run in found)
-    )
-
+    found = [scene.with_values(dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+    if columns and not found:
+        raise SceneError("parameters: nothing to compute (got arrays of 0 values; allowed 1 or more)")
+    return found or [scene]
 
 @dataclass(frozen=True, eq=False)
-class _Tips:
-    """One run: rows of time, depth and tip deflection (3, outputs), its error estimate and its steps."""
+class _One:
+    """One run: rows of time, depth, tip deflection and what else was asked for (3 + variables, outputs)."""
 
     rows: Array
     error: float
     steps: int
 
 
-def _one(scene: Scene) -> _Tips:
-    if _is_given(scene):
-        return _straight(scene)
-    run = run_scene(scene)
+def _gathered(scenes: list[Scene], names: tuple[str, ...], threads: int, progress: Progress) -> ManyRuns:
+    """Run every scene in a thread, and gather what they gave; compiled code is there before threads start."""
+    warming.prepare()
+    with ThreadPoolExecutor(threads) as pool:
+        waiting = [pool.submit(_one, scene, names) for scene in scenes]
+        try:
+            for done, finished in enumerate(as_completed(waiting), start=1):
+                finished.result()
+                progress(done / len(scenes))
+        except ComputationError as error:
+            pool.shutdown(cancel_futures=True)
+            failed = next(number for number, run in enumerate(waiting) if run.done() and not run.cancelled() and run.exception())
+            located = ComputationError(f"run {failed}: {error}")
+            located.partial = _table([_finished(run) for run in waiting], names)
+            raise located from error
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+        return _table([run.result() for run in waiting], names)
+
+
+def _finished(run: Future[_One]) -> _One | None:
+    return run.result() if run.done() and not run.cancelled() and run.exception() is None else None
+
+
+def _table(runs: Sequence[_One | None], names: tuple[str, ...]) -> ManyRuns:
+    """Return all runs; NaN where there is none."""
+    found = [run for run in runs if run is not None]
+    columns = np.full((3 + len(names), len(runs), max((run.rows.shape[1] for run in found), default=0)), np.nan)
+    for number, run in enumerate(runs):
+        if run is not None:
+            columns[:, number, : run.rows.shape[1]] = run.rows
+    error = float(np.max([run.error for run in found])) if found else np.nan
+    variables = dict(zip(names, columns[3:], strict=True))
+    return ManyRuns(columns[0], columns[1], columns[2], error, sum(run.steps for run in found), variables)
+
+
+def _one(scene: Scene, names: tuple[str, ...]) -> _One:
+    """Run a scene: where it gives mesh and step, without a look at what they cost."""
+    run = simulate(build_plant(scene)) if _is_given(scene) else run_scene(scene)
     estimate = run.summary["error_estimate"]
-    rows = np.stack([run.time, run.depth, run.tip_deflection])
-    return _Tips(rows, np.nan if estimate is None else estimate, int(run.summary["steps"]))
+    rows = np.stack([run.time, run.depth, run.tip_deflection, *(run.series[name] for name in names)])
+    return _One(rows, np.nan if estimate is None else estimate, int(run.summary["steps"]))
 
 
 def _is_given(scene: Scene) -> bool:
@@ -285,21 +215,3 @@ def _is_given(scene: Scene) -> bool:
     numerics = scene.numerics
     has_mesh = scene.model.kind != "fem" or numerics.elements != "auto" or numerics.mesh is not None
     return has_mesh and numerics.time_step != "auto"
-
-
-def _straight(scene: Scene) -> _Tips:
-    """Return the tips of a run whose settings are given, and nothing else."""
-    plant = build_plant(scene)
-    choice = choose(scene, lambda: plant)
-    grid = time_grid(plant, float(scene.numerics.time_step), choice.output_step)
-    running = run_samples(plant, integration_of(plant, scene, choice.analysis), grid)
-    blocks: list[Samples] = []
-    while True:
-        try:
-            blocks.append(next(running))
-        except StopIteration as finished:
-            end = finished.value
-            break
-    samples = joined(blocks)
-    tips = plant.deflection(samples.coordinates, samples.point_forces, samples.depth, np.array([scene.needle.length]))
-    return _Tips(np.stack([samples.time, samples.depth, tips[:, 0]]), np.nan, end.steps)

@@ -15,17 +15,17 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle import load_scene
 from fem_needle.batch.many import simulate_many
 from fem_needle.benchmark.cases import Case, cases_of
 from fem_needle.benchmark.loop import whole_loop, whole_run
 from fem_needle.benchmark.machine import load
 from fem_needle.benchmark.methods import Setting
-from fem_needle.benchmark.own_methods import FixedElements, ToleranceElements
+from fem_needle.benchmark.own_methods import AssumedModes, FixedElements, ToleranceElements
 from fem_needle.benchmark.random_scenes import random_scene
 from fem_needle.benchmark.reference import reference_tips
 from fem_needle.benchmark.result import Row
 from fem_needle.benchmark.timing import seconds
-from fem_needle.benchmark.vibration_methods import ElementVibrations, ModeVibrations
 from fem_needle.errors import NeedleError
 from fem_needle.models import build_plant
 
@@ -33,9 +33,8 @@ Array = NDArray[np.float64]
 
 ELEMENTS, STEP = 40, 5e-4  # s
 LOOP_ROUNDS = 7
-MOVING = 2  # vibrations of the 40 elements
 HIT_RATE = 99.0  # %
-BATCH, FEW = 10_000, 8
+BATCH, FEW = 200, 4
 BUSY = 1.5  # processes: what a benchmark alone stays below
 MODULUS = "tissue.layers.0.foundation_modulus"
 PROCESS_ROUNDS = 5
@@ -59,10 +58,6 @@ def _loop(name: str, step: float) -> Callable[[], Array]:
     return whole_loop(build_plant(FixedElements().scene(case, Setting(elements=ELEMENTS, time_step=step))))
 
 
-def _vibrations(name: str) -> Callable[[], Array]:
-    return ElementVibrations().prepare(_case(name), Setting(elements=ELEMENTS, modes=MOVING, time_step=STEP))
-
-
 def _median(call: Callable[[], Array]) -> tuple[float, str]:
     """Return the median time of a call [s], and the spread in words."""
     call()
@@ -72,22 +67,10 @@ def _median(call: Callable[[], Array]) -> tuple[float, str]:
 
 @cache
 def time_per_step(name: str) -> Measured:
-    """Return the median time of a step of 0.5 ms of a case, the loop as a whole, tips alone, in vibrations of 40 elements [us].
-
-    Noted beside it is the loop over all coordinates of the same elements, with energies, works and reactions.
-    """
+    """Return the median time of a step of 0.5 ms of a case on 40 elements, energies, works and reactions included [us]."""
     steps = Setting(time_step=STEP).steps(_case(name)) or 1
-    time, shown = _median(_vibrations(name))
-    whole, _ = _median(_loop(name, STEP))
-    beside = f"all coordinates with ledger: {MICROSECONDS * whole / steps:.3g} us"
-    return Measured(MICROSECONDS * time / steps, f"{steps} steps in {shown}, {MOVING} vibrations move; {beside}")
-
-
-@cache
-def error_of_vibrations(name: str) -> Measured:
-    """Return the error of the same loop (1)."""
-    case = _case(name)
-    return Measured(case.error(_vibrations(name)(), reference_tips(case)))
+    time, shown = _median(_loop(name, STEP))
+    return Measured(MICROSECONDS * time / steps, f"{steps} steps in {shown}")
 
 
 @cache
@@ -162,7 +145,7 @@ def cost_of_tolerance(rows: Sequence[Row]) -> Measured:
 def _two_modes(step: float) -> Callable[[], Array]:
     case = _case("M2")
     coarser = replace(case, output_step=max(step, case.output_step or 0.0))
-    return ModeVibrations().prepare(coarser, Setting(modes=2, time_step=step))
+    return AssumedModes().prepare(coarser, Setting(modes=2, variant="inserted-length", time_step=step))
 
 
 def stability_of_two_modes() -> Measured:
@@ -177,7 +160,7 @@ def stability_of_two_modes() -> Measured:
 
 
 def time_per_step_of_two_modes() -> Measured:
-    """Return the median time of a step of 1 ms of two modes on M2, tips alone [us]."""
+    """Return the median time of a step of 1 ms of two modes on M2 [us]."""
     steps = Setting(time_step=1e-3).steps(_case("M2")) or 1
     time, shown = _median(_two_modes(1e-3))
     return Measured(MICROSECONDS * time / steps, f"{steps} steps in {shown}")
@@ -205,16 +188,17 @@ def time_of_command(*arguments: str) -> Measured:
 def batch_efficiency() -> Measured:
     """Return the efficiency of a batch on two cores: time on one / twice the time on two [%].
 
-    The batch is case M with 10 000 foundation moduli.
+    The batch is `brachytherapy` with inertia, 6 elements and steps of 6 ms, and 200 foundation moduli.
     """
-    scene = _case("M").scene
-    moduli = np.linspace(300.0, 800.0, BATCH)
+    settings = {"numerics.elements": 6, "numerics.time_step": 6e-3, "numerics.analysis": "dynamic"}
+    scene = load_scene("brachytherapy").with_values(settings)
+    moduli = np.linspace(3e3, 5e3, BATCH)
 
-    def run(count: int, cores: int) -> float:
-        return seconds(lambda: simulate_many(scene, {MODULUS: moduli[:count]}, time_step=1e-2, cores=cores))
+    def run(count: int, threads: int) -> float:
+        return seconds(lambda: simulate_many(scene, {MODULUS: moduli[:count]}, threads=threads))
 
-    for cores in (1, 2):
-        run(FEW, cores)  # compiles
+    for threads in (1, 2):
+        run(FEW, threads)
     others = f"; others kept the cores busy, load {load():.1f}" if load() > BUSY else ""
     one, two = run(BATCH, 1), run(BATCH, 2)
     return Measured(100.0 * one / (2 * two), f"{BATCH} runs: {one:.3g} s on one core, {two:.3g} s on two{others}")

@@ -21,7 +21,6 @@ from fem_needle.benchmark.reference import how, reference_tips
 from fem_needle.benchmark.result import Benchmark, CaseInformation, Row
 from fem_needle.benchmark.rivals import Rivals
 from fem_needle.benchmark.timing import SLOW, seconds, take_turns
-from fem_needle.benchmark.vibration_methods import ElementVibrations, ModeVibrations
 from fem_needle.errors import NeedleError
 
 Array = NDArray[np.float64]
@@ -30,8 +29,6 @@ METHODS: tuple[Method, ...] = (
     FixedElements(),
     ToleranceElements(),
     AssumedModes(),
-    ElementVibrations(),
-    ModeVibrations(),
     ExactStatics(),
     ModesAndCosines(),
     NaiveElements(),

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fem_needle.collocation import Collocation
 from fem_needle.dynamics import names as at
-from fem_needle.dynamics.engine import _COLUMNS, REST, Engine
+from fem_needle.dynamics.engine import REST, SAMPLE_COLUMNS, Engine
 from fem_needle.dynamics.push import Push
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
@@ -81,7 +81,7 @@ class LoopEngine(Engine):
     def keep(self, samples: Samples) -> None:
         """Let the last of some samples be the `row`."""
         n, p, row = self.model.size, self.model.points, self.row
-        for name, column in _COLUMNS.items():
+        for name, column in SAMPLE_COLUMNS.items():
             row[column] = getattr(samples, name)[-1]
         row[at.R_PIECES] = max(0, int(samples.path_points[-1]) - 2)
         row[at.RECORD : at.RECORD + n], row[at.RECORD + n : at.RECORD + n + p] = samples.coordinates[-1], samples.point_forces[-1]

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 DYNAMIC, CREEP, REST = "dynamic", "creep", "rest"  # with inertia; without; through equilibria
 NUMBERS_OF_A_CALL = 400_000  # coordinates times steps: a fraction of a second, in which an interrupt waits
 
-_COLUMNS = {
+SAMPLE_COLUMNS = {
     "time": at.R_TIME, "depth": at.R_DEPTH, "speed": at.R_SPEED, "push_force": at.R_PUSH, "friction_force": at.R_FRICTION,
     "tissue_force": at.R_TISSUE, "hub_force": at.R_HUB, "hub_moment": at.R_MOMENT, "kinetic_energy": at.R_KINETIC,
     "bending_energy": at.R_BENDING, "tissue_energy": at.R_ELASTIC, "guide_energy": at.R_GUIDE,
@@ -136,7 +136,7 @@ class Engine:
         parts = np.split(record[:, at.RECORD :], [n, n + p], axis=1)
         position, deflection = self.live.path_points()
         pieces = record[:, at.R_PIECES].astype(np.int64)
-        values: dict[str, Any] = {name: np.ascontiguousarray(record[:, column]) for name, column in _COLUMNS.items()}
+        values: dict[str, Any] = {name: np.ascontiguousarray(record[:, column]) for name, column in SAMPLE_COLUMNS.items()}
         return Samples(
             **values,
             coordinates=np.ascontiguousarray(parts[0]),

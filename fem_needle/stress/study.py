@@ -9,6 +9,7 @@ from multiprocessing import get_context
 from os import cpu_count
 
 from fem_needle.display import Card, Shown
+from fem_needle.dynamics import warming
 from fem_needle.stress.cases import Case, cases
 from fem_needle.stress.trial import Figure, Trial
 
@@ -131,6 +132,7 @@ def stress(
     count = (LONG_RANDOM_SCENES if long else RANDOM_SCENES) if random_scenes is None else random_scenes
     chosen = cases(count, first_seed, long=long)
     jobs = [job for case in chosen for job in case.jobs]
+    warming.prepare()
     with ProcessPoolExecutor(processes or cpu_count() or 1, get_context("spawn")) as pool:
         futures = [pool.submit(job) for job in jobs]
         found = []

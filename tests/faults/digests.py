@@ -34,8 +34,8 @@ def more_runs():
     yield "elements", of_run(run_scene(moving, elements=150))
     yield "static", of_run(run_scene(load_scene("thesis"), elements=300, analysis="static", time_step=2.0, output_step=2.0))
     forces = np.linspace(0.05, 0.2, 8)
-    for cores in (1, 2):
-        many = simulate_many(load_scene("thesis"), {"loads.0.force": forces}, cores=cores)
+    for threads in (1, 2):
+        many = simulate_many(load_scene("thesis"), {"loads.0.force": forces}, threads=threads)
         yield "many", digest(many.final_tip_deflection)
     loop = load_scene("steering").with_values({"numerics.elements": 8, "insertion.final_depth": 0.05, "target.depth": 0.05})
     yield "loop", of_run(steer(loop))

@@ -8,12 +8,10 @@ from tests.house.source import PACKAGES, ROOT, Function, functions, module_name,
 LONGEST_FUNCTION = 40
 LONGEST_FILE = 400
 SOURCE = python_files(*PACKAGES)
-# Where an import inside a function is right: commands load what they use, a result reaches its folder late, a batch that
-# compiles nothing does not load numba.
+# Where an import inside a function is right: commands load what they use, a result reaches its folder late.
 LATE_IMPORTS = {
     ("fem_needle.trajectory", "save"),
     ("fem_needle.trajectory", "load"),
-    ("fem_needle.batch.many", "prepared"),
     ("fem_needle.view.picture", "_rendered"),  # VTK, in the process that draws
 }
 LATE_PACKAGES = ("fem_needle.cli", "reduced_model.commands")

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
-from fem_needle import FiniteElementNeedle, Simulation, simulate, simulate_many
-from fem_needle.batch.spectrum import spectrum_of
+from fem_needle import FiniteElementNeedle, Simulation, simulate
 from fem_needle.scene import Friction, Insertion, LateralLoad, Layer, Numerics, Sinusoid, Table, TipLoad
 from reduced_model import AssumedModeNeedle
-from tests.consistency.scenes import MASS, STIFFNESS, held, moving, scene_of
+from tests.consistency.scenes import held, scene_of
 from tests.stability.assembled import Assembled, Creeping, Pushed
 
 DURATION = 1.28e-3
@@ -186,59 +184,7 @@ def looped(model, case, *, push=False):
     return errors, counts
 
 
-VIBRATIONS = 3
 
-
-def batch_scene(case):
-    """A uniform run; "kinked": it comes to rest on the way."""
-    motion, kind = case.split(", ")
-    speed = {"held": held(0.1), "moving": moving(2.8, 0.1, 0.102 if kind == "kinked" else 0.11)}[motion]
-    return scene_of("entry", speed, VISCOUS, [TipLoad(force=SMOOTH)], duration=DURATION)
-
-
-@cache
-def batch_reference(case):
-    """The tip of the lowest vibrations by DOP853, and of the others at equilibrium."""
-    scene = batch_scene(case)
-    plant = FiniteElementNeedle(scene, elements=96)
-    many, few = spectrum_of(plant, VIBRATIONS), slice(VIBRATIONS)
-    speed, rest = (0.0, 0.0) if case.startswith("held") else (2.8, min((scene.insertion.final_depth - 0.1) / 2.8, DURATION))
-    modulus, viscosity = VISCOUS[0].foundation_modulus, VISCOUS[0].damping
-
-    def depth(time):
-        return 0.1 + speed * min(time, rest)
-
-    def rate(time, y, speed):
-        z, a, momentum = depth(time), y[few], y[VIBRATIONS:]
-        velocities = (momentum / MASS - speed * (many.convection @ a)) / z
-        inertial = MASS * (speed * many.convection.T @ velocities + speed**2 / z * many.centrifugal @ a)
-        elastic = (STIFFNESS * many.roots[few] / z**3 + modulus * z) * a
-        viscous = viscosity * (z * velocities + speed * many.drag @ a)
-        return np.concatenate([velocities, inertial - elastic - viscous + SMOOTH.value(time) * many.tips[few]])
-
-    stiffness = STIFFNESS * many.roots[few] / 1e-3 + modulus * 0.1
-    start = SMOOTH.value(0.0) * many.tips[few] / stiffness
-    change = -start * (modulus - 3.0 * STIFFNESS * many.roots[few] / 1e-4) / stiffness  # da/dz of equilibria
-    state = np.concatenate([start, MASS * speed * (0.1 * change + many.convection @ start)])
-    for begin, end, moves in ((0.0, rest, speed), (rest, DURATION, 0.0)):
-        if end > begin:
-            tolerance = 1e-12 * np.repeat([np.max(np.abs(start)), 1e-5], VIBRATIONS)
-            found = solve_ivp(rate, (begin, end), state, method="DOP853", rtol=1e-12, atol=tolerance, args=(moves,))
-            state = found.y[:, -1]
-    z, others = depth(DURATION), slice(VIBRATIONS, None)
-    resting = np.sum(many.tips[others] ** 2 / (STIFFNESS * many.roots[others] / z**3 + modulus * z))
-    return float(many.tips[few] @ state[few] + SMOOTH.value(DURATION) * resting)
-
-
-def batch(case):
-    """Errors and numbers of steps of the loop over many runs."""
-    scene, true, errors, counts = batch_scene(case), batch_reference(case), [], []
-    scene = scene.with_value("numerics.output_step", DURATION)
-    for step in STEPS:
-        many = simulate_many(scene, time_step=step, vibrations=VIBRATIONS)
-        errors.append(abs(many.final_tip_deflection[0] / true - 1.0))
-        counts.append(many.steps)
-    return errors, counts
 
 
 # A slow needle in its own path: quasi-static, and with inertia and viscosity.
@@ -280,7 +226,6 @@ def rows():
         ("commanded force, elements, hub", 4, only(looped, HUB, cases=CASES[1::2])),
         ("commanded force, modes, hub", 4, only(looped, HUB_MODES, cases=CASES[1::2])),
         ("commanded push, elements, hub", 4, only(looped, HUB, cases=CASES[3:], push=True)),
-        ("loop over many runs, vibrations", 4, only(batch, cases=(CASES[0], *inward))),
         *((f"cut path (Radau), {name}", 2, only(cut, model, cases=inward)) for name, model in ENTRY.items()),
     ]
 
