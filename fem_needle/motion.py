@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf, nextafter
-from typing import Protocol
 
 import numpy as np
 import scipy  # its parts are loaded where they are used
@@ -30,22 +29,6 @@ class Instant:
     depth: float
     speed: float
     acceleration: float
-
-
-class Motion(Protocol):
-    """What a stepper asks of the insertion over one step."""
-
-    def layer_depth(self, start: float, end: float) -> float:
-        """Return a depth [m] in the layer that holds the tip between two times: steps land on interfaces."""
-
-    def depth(self, time: float) -> float:
-        """Return z(t) [m]."""
-
-    def after(self, time: float) -> Instant:
-        """Return the motion just after a time."""
-
-    def before(self, time: float) -> Instant:
-        """Return the motion just before a time."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ the increments of the free coordinates up to the stages; guides add their forces
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -73,29 +73,12 @@ def evaluate_stage(
     return stage if path is None else with_path(plant, stage, path)
 
 
-def with_path(plant: Plant, stage: Stage, path: CutPath, history: PathHistory | None = None) -> Stage:
-    """Return the stage with the tissue's springs resting on a path; what lies behind a step's start comes from its history."""
+def with_path(plant: Plant, stage: Stage, path: CutPath) -> Stage:
+    """Return the stage with the tissue's springs resting on a path."""
     swelling = as_function(plant.scene.tissue.stiffness_factor)
     time, depth = stage.instant.time, stage.instant.depth
-    if history is None:
-        rest = plant.rest_terms(path, depth, -inf, inf)
-    else:
-        rest = history.at(plant, depth) + plant.rest_terms(path, depth, history.path.deepest, inf)
+    rest = plant.rest_terms(path, depth, -inf, inf)
     return replace(stage, rest=rest, factor=swelling.value(time), factor_rate=swelling.derivative(time))
-
-
-@dataclass(frozen=True, eq=False)
-class PathHistory:
-    """The path behind a step's start, integrated once for each depth of the step while the iteration goes on."""
-
-    path: CutPath
-    _known: dict[float, RestTerms] = field(default_factory=dict)
-
-    def at(self, plant: Plant, depth: float) -> RestTerms:
-        """Return the terms at a depth [m]."""
-        if depth not in self._known:
-            self._known[depth] = plant.rest_terms(self.path, depth, -inf, self.path.deepest)
-        return self._known[depth]
 
 
 def momentum(stage: Stage, coordinates: Array, velocities: Array) -> Array:
@@ -104,16 +87,6 @@ def momentum(stage: Stage, coordinates: Array, velocities: Array) -> Array:
     if stage.operators.convection is not None and stage.instant.speed:
         result += stage.instant.speed * banded.multiply(stage.operators.convection, coordinates)
     return result
-
-
-def velocities_of(plant: Plant, stage: Stage, coordinates: Array, start_momentum: Array) -> Array:
-    """Return q' from P = M q' + v S q and the clamp's own velocity."""
-    clamped = plant.prescribed
-    velocities = np.zeros_like(coordinates)
-    velocities[:clamped] = stage.case.clamp_rates[:clamped]
-    right = (start_momentum - momentum(stage, coordinates, velocities))[clamped:]
-    velocities[clamped:] = stage.operators.mass_factorization.solve(right)
-    return velocities
 
 
 def internal_force(stage: Stage, coordinates: Array, velocities: Array) -> Array:

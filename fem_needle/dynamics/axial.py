@@ -7,30 +7,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from fem_needle.dynamics import names as ix
 from fem_needle.dynamics.compilation import inner
-from fem_needle.dynamics.names import (
-    COULOMB,
-    COULOMB_PER_LENGTH,
-    CUTTING,
-    LAYER_END,
-    LAYER_START,
-    LENGTH,
-    MASS_PER_LENGTH,
-    VISCOUS_FRICTION,
-    VISCOUS_FRICTION_PER_LENGTH,
-)
 
 
 @inner
 def coulomb_force(numbers, depth):
     """Return mu_s + mu_s' z."""
-    return numbers[COULOMB] + numbers[COULOMB_PER_LENGTH] * depth
+    return numbers[ix.COULOMB] + numbers[ix.COULOMB_PER_LENGTH] * depth
 
 
 @inner
 def viscous_coefficient(numbers, depth):
     """Return mu_v + mu_v' z."""
-    return numbers[VISCOUS_FRICTION] + numbers[VISCOUS_FRICTION_PER_LENGTH] * depth
+    return numbers[ix.VISCOUS_FRICTION] + numbers[ix.VISCOUS_FRICTION_PER_LENGTH] * depth
 
 
 @inner
@@ -46,8 +36,8 @@ def cutting_force(layers, depth, speed, deepest):
     """Return the cutting force of the layer at the tip: only while the tip advances into uncut tissue."""
     if speed > 0.0 and depth >= deepest:
         for number in range(layers.shape[0]):
-            if depth >= layers[number, LAYER_START] and depth < layers[number, LAYER_END]:
-                return layers[number, CUTTING]
+            if depth >= layers[number, ix.LAYER_START] and depth < layers[number, ix.LAYER_END]:
+                return layers[number, ix.CUTTING]
     return 0.0
 
 
@@ -56,9 +46,9 @@ def cutting_work(layers, start, end):
     """Return the work that cutting takes from one deepest point to the next."""
     total = 0.0
     for number in range(layers.shape[0]):
-        if layers[number, CUTTING] != 0.0:
-            first, last = max(layers[number, LAYER_START], start), max(layers[number, LAYER_END], start)
-            total += layers[number, CUTTING] * (min(max(end, first), last) - first)
+        if layers[number, ix.CUTTING] != 0.0:
+            first, last = max(layers[number, ix.LAYER_START], start), max(layers[number, ix.LAYER_END], start)
+            total += layers[number, ix.CUTTING] * (min(max(end, first), last) - first)
     return total
 
 
@@ -68,7 +58,7 @@ def node_speeds(h, inverse, numbers, direction, cutting, begin, depths, pushes, 
 
     begin: Pi at the start; configuration: A without - d(dT/dv)/dt; momenta: dT/dv at the nodes.
     """
-    mass = numbers[MASS_PER_LENGTH] * numbers[LENGTH]
+    mass = numbers[ix.MASS_PER_LENGTH] * numbers[ix.LENGTH]
     det = inverse[0, 0] * inverse[1, 1] - inverse[0, 1] * inverse[1, 0]
     a00, a01 = h * inverse[1, 1] / det, -h * inverse[0, 1] / det
     a10, a11 = -h * inverse[1, 0] / det, h * inverse[0, 0] / det

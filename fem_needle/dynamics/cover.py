@@ -8,39 +8,8 @@ integrated by Gauss's rule, exactly. This is the only place where a foundation m
 
 from __future__ import annotations
 
+from fem_needle.dynamics import names as ix
 from fem_needle.dynamics.compilation import inner
-from fem_needle.dynamics.names import (
-    BENDING,
-    BENDING_STIFFNESS,
-    CENTRIFUGAL,
-    CONVECTED,
-    CONVECTION,
-    DAMPING,
-    DEPTH,
-    DRAG,
-    FIXED,
-    FRAME,
-    LAYER_END,
-    LAYER_START,
-    LENGTH,
-    MASS,
-    MASS_PER_LENGTH,
-    MATERIAL,
-    MODULUS,
-    SIDE,
-    SLIP,
-    STRETCH,
-    STRETCHED,
-    STRIDE,
-    TIP_STIFFNESS,
-    TISSUE,
-    UNIT_BENDING,
-    UNIT_DRAG,
-    UNIT_MASS,
-    UNIT_SLIP,
-    VISCOSITY,
-    VISCOUS,
-)
 
 
 @inner
@@ -59,9 +28,9 @@ def locate(nodes, x):
 @inner
 def place_of(y, depth, frame, length):
     """Return the place on the shapes of a point of the inserted part at y."""
-    if frame == MATERIAL:
+    if frame == ix.MATERIAL:
         return min(max(y + (length - depth), 0.0), length)
-    if frame == STRETCHED:
+    if frame == ix.STRETCHED:
         return min(max(y / depth, 0.0), 1.0)
     return min(max(y, 0.0), depth)
 
@@ -69,17 +38,17 @@ def place_of(y, depth, frame, length):
 @inner
 def tip_place(depth, frame, length):
     """Return the tip's place on the shapes."""
-    if frame == MATERIAL:
+    if frame == ix.MATERIAL:
         return length
-    return 1.0 if frame == STRETCHED else depth
+    return 1.0 if frame == ix.STRETCHED else depth
 
 
 @inner
 def place_rate(y, depth, frame):
     """Return how fast the place of a fixed y moves on the shapes with the depth."""
-    if frame == MATERIAL:
+    if frame == ix.MATERIAL:
         return -1.0
-    return -y / (depth * depth) if frame == STRETCHED else 0.0
+    return -y / (depth * depth) if frame == ix.STRETCHED else 0.0
 
 
 @inner
@@ -99,11 +68,11 @@ def shapes_at(coef, nodes, piece, x, out):
 @inner
 def layer_ends(layer, course, frame, length):
     """Return where a layer that the tip has entered begins and ends on the shapes."""
-    depth = course[DEPTH]
+    depth = course[ix.DEPTH]
     last = tip_place(depth, frame, length)
-    if course[SIDE] > layer[LAYER_END]:
-        last = place_of(layer[LAYER_END], depth, frame, length)
-    return place_of(layer[LAYER_START], depth, frame, length), last
+    if course[ix.SIDE] > layer[ix.LAYER_END]:
+        last = place_of(layer[ix.LAYER_END], depth, frame, length)
+    return place_of(layer[ix.LAYER_START], depth, frame, length), last
 
 
 @inner
@@ -118,37 +87,37 @@ def add_part(a, b, piece, k, c, power, coef, nodes, quad, shape, matrices):
         for i in range(m):
             share = weight * shape[0, i]
             for j in range(m):
-                matrices[TISSUE, i, j] += k * share * shape[0, j]
+                matrices[ix.TISSUE, i, j] += k * share * shape[0, j]
         if c != 0.0:
             for i in range(m):
                 share, slip = c * weight * shape[0, i], c * weight * moves * moves * shape[1, i]
                 for j in range(m):
-                    matrices[DAMPING, i, j] += share * shape[0, j]
-                    matrices[DRAG, i, j] += share * moves * shape[1, j]
-                    matrices[SLIP, i, j] += slip * shape[1, j]
+                    matrices[ix.DAMPING, i, j] += share * shape[0, j]
+                    matrices[ix.DRAG, i, j] += share * moves * shape[1, j]
+                    matrices[ix.SLIP, i, j] += slip * shape[1, j]
 
 
 @inner
 def mark_pieces(course, nodes, switches, numbers, layers, fresh):
     """Set what each piece holds: the sum of k and of c of whole ones, and whether it is cut (P, 3)."""
-    frame, pieces, viscous = switches[FRAME], len(nodes) - 1, switches[VISCOUS]
+    frame, pieces, viscous = switches[ix.FRAME], len(nodes) - 1, switches[ix.VISCOUS]
     for piece in range(pieces):
         fresh[piece, 0], fresh[piece, 1], fresh[piece, 2] = 0.0, 0.0, 0.0
     for number in range(layers.shape[0]):
         layer = layers[number]
-        if not course[SIDE] > layer[LAYER_START]:
+        if not course[ix.SIDE] > layer[ix.LAYER_START]:
             continue
-        start, end = layer_ends(layer, course, frame, numbers[LENGTH])
+        start, end = layer_ends(layer, course, frame, numbers[ix.LENGTH])
         for piece in range(locate(nodes, start), pieces):
             a, b = max(start, nodes[piece]), min(end, nodes[piece + 1])
             if a >= end:
                 break
             if a == nodes[piece] and b == nodes[piece + 1]:
-                fresh[piece, 0] += layer[MODULUS]
-                fresh[piece, 1] += layer[VISCOSITY] * viscous
+                fresh[piece, 0] += layer[ix.MODULUS]
+                fresh[piece, 1] += layer[ix.VISCOSITY] * viscous
             elif b > a:
                 fresh[piece, 2] = 1.0
-    if numbers[TIP_STIFFNESS] != 0.0:
+    if numbers[ix.TIP_STIFFNESS] != 0.0:
         fresh[pieces - 1, 2] = 1.0
 
 
@@ -158,23 +127,23 @@ def whole_block(k, c, units, matrices):
     m = units.shape[1]
     for i in range(m):
         for j in range(m):
-            matrices[TISSUE, i, j] = k * units[UNIT_MASS, i, j]
-            matrices[DAMPING, i, j] = c * units[UNIT_MASS, i, j]
-            matrices[DRAG, i, j] = c * units[UNIT_DRAG, i, j]
-            matrices[SLIP, i, j] = c * units[UNIT_SLIP, i, j]
+            matrices[ix.TISSUE, i, j] = k * units[ix.UNIT_MASS, i, j]
+            matrices[ix.DAMPING, i, j] = c * units[ix.UNIT_MASS, i, j]
+            matrices[ix.DRAG, i, j] = c * units[ix.UNIT_DRAG, i, j]
+            matrices[ix.SLIP, i, j] = c * units[ix.UNIT_SLIP, i, j]
 
 
 @inner
 def add_parts(course, nodes, coef, quad, switches, numbers, layers, shape, matrices):
     """Add the parts of cut pieces, and a spring at the tip, to the blocks' tissue matrices (B, 4, m, m)."""
-    frame, pieces, stride = switches[FRAME], len(nodes) - 1, switches[STRIDE]
-    power = 1 if frame == STRETCHED else 0
+    frame, pieces, stride = switches[ix.FRAME], len(nodes) - 1, switches[ix.STRIDE]
+    power = 1 if frame == ix.STRETCHED else 0
     for number in range(layers.shape[0]):
         layer = layers[number]
-        if not course[SIDE] > layer[LAYER_START]:
+        if not course[ix.SIDE] > layer[ix.LAYER_START]:
             continue
-        k, c = layer[MODULUS], layer[VISCOSITY] * switches[VISCOUS]
-        start, end = layer_ends(layer, course, frame, numbers[LENGTH])
+        k, c = layer[ix.MODULUS], layer[ix.VISCOSITY] * switches[ix.VISCOUS]
+        start, end = layer_ends(layer, course, frame, numbers[ix.LENGTH])
         for piece in range(locate(nodes, start), pieces):
             a, b = max(start, nodes[piece]), min(end, nodes[piece + 1])
             if a >= end:
@@ -182,14 +151,14 @@ def add_parts(course, nodes, coef, quad, switches, numbers, layers, shape, matri
             if b > a and not (a == nodes[piece] and b == nodes[piece + 1]):
                 block = piece if stride else 0
                 add_part(a, b, piece, k, c, power, coef, nodes, quad, shape, matrices[block])
-    if numbers[TIP_STIFFNESS] != 0.0:
-        tip = tip_place(course[DEPTH], frame, numbers[LENGTH])
-        piece, k = locate(nodes, tip), numbers[TIP_STIFFNESS] / course[STRETCH]  # the spring itself is not stretched
+    if numbers[ix.TIP_STIFFNESS] != 0.0:
+        tip = tip_place(course[ix.DEPTH], frame, numbers[ix.LENGTH])
+        piece, k = locate(nodes, tip), numbers[ix.TIP_STIFFNESS] / course[ix.STRETCH]  # the spring itself is not stretched
         shapes_at(coef, nodes, piece, tip, shape)
         block = piece if stride else 0
         for i in range(coef.shape[1]):
             for j in range(coef.shape[1]):
-                matrices[block, TISSUE, i, j] += k * shape[0, i] * shape[0, j]
+                matrices[block, ix.TISSUE, i, j] += k * shape[0, i] * shape[0, j]
 
 
 @inner
@@ -216,42 +185,42 @@ def add_sums(first, last, factor, sums, kind, matrix):
 @inner
 def cover_functions(course, nodes, coef, quad, sums, switches, numbers, layers, matrices, covered, shape, changed):
     """Form the tissue matrices (1, 4, n, n) of functions that live on all pieces."""
-    frame, pieces = switches[FRAME], len(nodes) - 1
-    if covered[0, 0] == course[DEPTH] and covered[0, 1] == course[SIDE]:
+    frame, pieces = switches[ix.FRAME], len(nodes) - 1
+    if covered[0, 0] == course[ix.DEPTH] and covered[0, 1] == course[ix.SIDE]:
         return
     changed[0] = 1
-    covered[0, 0], covered[0, 1] = course[DEPTH], course[SIDE]
+    covered[0, 0], covered[0, 1] = course[ix.DEPTH], course[ix.SIDE]
     matrices[0, :, :, :] = 0.0
     for number in range(layers.shape[0]):
         layer = layers[number]
-        if not course[SIDE] > layer[LAYER_START]:
+        if not course[ix.SIDE] > layer[ix.LAYER_START]:
             continue
-        start, end = layer_ends(layer, course, frame, numbers[LENGTH])
+        start, end = layer_ends(layer, course, frame, numbers[ix.LENGTH])
         first, last = locate(nodes, start), locate(nodes, end)
         first += 1 if nodes[first] < start else 0
         last += 1 if last + 1 == pieces and nodes[pieces] <= end else 0
         if last > first:
-            c = layer[VISCOSITY] * switches[VISCOUS]
-            add_sums(first, last, layer[MODULUS], sums, UNIT_MASS, matrices[0, TISSUE])
+            c = layer[ix.VISCOSITY] * switches[ix.VISCOUS]
+            add_sums(first, last, layer[ix.MODULUS], sums, ix.UNIT_MASS, matrices[0, ix.TISSUE])
             if c != 0.0:
-                add_sums(first, last, c, sums, UNIT_MASS, matrices[0, DAMPING])
-                add_sums(first, last, c, sums, UNIT_DRAG, matrices[0, DRAG])
-                add_sums(first, last, c, sums, UNIT_SLIP, matrices[0, SLIP])
+                add_sums(first, last, c, sums, ix.UNIT_MASS, matrices[0, ix.DAMPING])
+                add_sums(first, last, c, sums, ix.UNIT_DRAG, matrices[0, ix.DRAG])
+                add_sums(first, last, c, sums, ix.UNIT_SLIP, matrices[0, ix.SLIP])
     add_parts(course, nodes, coef, quad, switches, numbers, layers, shape, matrices)
-    if frame == FIXED:  # its shapes rest with the tissue
-        matrices[0, DRAG:, :, :] = 0.0
+    if frame == ix.FIXED:  # its shapes rest with the tissue
+        matrices[0, ix.DRAG :, :, :] = 0.0
 
 
 @inner
 def grow(course, nodes, coef, quad, sums, switches, numbers, shape, matrices):
     """Form the beam's own matrices M, K, S, R (4, n, n) of functions of y that the needle grows along, 0 <= y <= depth."""
-    depth, rho, bending = course[DEPTH], numbers[MASS_PER_LENGTH], numbers[BENDING_STIFFNESS]
-    piece, convected = locate(nodes, depth), 1.0 if switches[CONVECTED] else 0.0
+    depth, rho, bending = course[ix.DEPTH], numbers[ix.MASS_PER_LENGTH], numbers[ix.BENDING_STIFFNESS]
+    piece, convected = locate(nodes, depth), 1.0 if switches[ix.CONVECTED] else 0.0
     matrices[:, :, :] = 0.0
-    add_sums(0, piece, rho, sums, UNIT_MASS, matrices[MASS])
-    add_sums(0, piece, bending, sums, UNIT_BENDING, matrices[BENDING])
-    add_sums(0, piece, rho * convected, sums, UNIT_DRAG, matrices[CONVECTION])
-    add_sums(0, piece, rho * convected, sums, UNIT_SLIP, matrices[CENTRIFUGAL])
+    add_sums(0, piece, rho, sums, ix.UNIT_MASS, matrices[ix.MASS])
+    add_sums(0, piece, bending, sums, ix.UNIT_BENDING, matrices[ix.BENDING])
+    add_sums(0, piece, rho * convected, sums, ix.UNIT_DRAG, matrices[ix.CONVECTION])
+    add_sums(0, piece, rho * convected, sums, ix.UNIT_SLIP, matrices[ix.CENTRIFUGAL])
     size, m = depth - nodes[piece], coef.shape[1]
     for point in range(quad.shape[1]):
         weight = size * quad[1, point]
@@ -259,7 +228,7 @@ def grow(course, nodes, coef, quad, sums, switches, numbers, shape, matrices):
         for i in range(m):
             value, slope, bend = rho * weight * shape[0, i], rho * weight * shape[1, i], bending * weight * shape[2, i]
             for j in range(m):
-                matrices[MASS, i, j] += value * shape[0, j]
-                matrices[BENDING, i, j] += bend * shape[2, j]
-                matrices[CONVECTION, i, j] += convected * value * shape[1, j]
-                matrices[CENTRIFUGAL, i, j] += convected * slope * shape[1, j]
+                matrices[ix.MASS, i, j] += value * shape[0, j]
+                matrices[ix.BENDING, i, j] += bend * shape[2, j]
+                matrices[ix.CONVECTION, i, j] += convected * value * shape[1, j]
+                matrices[ix.CENTRIFUGAL, i, j] += convected * slope * shape[1, j]

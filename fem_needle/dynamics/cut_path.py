@@ -9,45 +9,11 @@ pieces together are kept (a binary tree), so that a path of n pieces costs log n
 
 from __future__ import annotations
 
+from fem_needle.dynamics import names as ix
 from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, integers_1
 from fem_needle.dynamics.callback import ask
 from fem_needle.dynamics.compilation import inner
 from fem_needle.dynamics.cover import locate
-from fem_needle.dynamics.names import (
-    ANSWERED,
-    ANSWERED_LOAD,
-    ASK_FRESH,
-    ASK_HISTORY,
-    ASKED,
-    AXIAL_STATE,
-    COEFFICIENTS,
-    COURSES,
-    CUT_MOMENTS,
-    DEEPEST,
-    DEPTH,
-    FRAME,
-    GIVEN,
-    LAYER,
-    LAYER_END,
-    LAYER_START,
-    LENGTH,
-    MATERIAL,
-    MODULUS,
-    NUMBER,
-    OWN_DEPTH,
-    PASCAL,
-    PATH_COUNT,
-    PATH_CUBICS,
-    PATH_EDGES,
-    PATH_LOAD,
-    PATH_LOAD_RATE,
-    PATH_MOMENTS,
-    PIECE_NODES,
-    SIDE,
-    STRETCHED,
-    STRIDE,
-    SWITCH,
-)
 
 
 @inner
@@ -122,16 +88,16 @@ def append_piece(end, cubic, count, edges, cubics, moments, squares, pascal):
 @inner
 def add_moments(arrays, k, ya, yb, moments, piece, course, load, load_rate):
     """Add k integral r psi over ya < y < yb, inside one piece of the shapes, from the moments of r there."""
-    nodes, coef, pascal = floats_1(arrays, PIECE_NODES), floats_3(arrays, COEFFICIENTS), floats_2(arrays, PASCAL)
-    switches, local = integers_1(arrays, SWITCH), floats_2(arrays, CUT_MOMENTS)[1]
-    frame, depth, size = switches[FRAME], course[DEPTH], nodes[piece + 1] - nodes[piece]
-    if frame == MATERIAL:
-        shift, scale = (ya + (floats_1(arrays, NUMBER)[LENGTH] - depth) - nodes[piece]) / size, (yb - ya) / size
-    elif frame == STRETCHED:
+    nodes, coef, pascal = floats_1(arrays, ix.PIECE_NODES), floats_3(arrays, ix.COEFFICIENTS), floats_2(arrays, ix.PASCAL)
+    switches, local = integers_1(arrays, ix.SWITCH), floats_2(arrays, ix.CUT_MOMENTS)[1]
+    frame, depth, size = switches[ix.FRAME], course[ix.DEPTH], nodes[piece + 1] - nodes[piece]
+    if frame == ix.MATERIAL:
+        shift, scale = (ya + (floats_1(arrays, ix.NUMBER)[ix.LENGTH] - depth) - nodes[piece]) / size, (yb - ya) / size
+    elif frame == ix.STRETCHED:
         shift, scale = (ya / depth - nodes[piece]) / size, (yb - ya) / (depth * size)
     else:
         shift, scale = (ya - nodes[piece]) / size, (yb - ya) / size
-    orders, at = coef.shape[2], switches[STRIDE] * piece
+    orders, at = coef.shape[2], switches[ix.STRIDE] * piece
     for n in range(orders):
         local[n] = k * shifted(moments, pascal, shift, scale, n)
     for i in range(coef.shape[1]):
@@ -139,21 +105,21 @@ def add_moments(arrays, k, ya, yb, moments, piece, course, load, load_rate):
         for n in range(1, orders):
             total += coef[piece, i, n] * local[n]
             moved = local[n - 1]
-            if frame == STRETCHED:
+            if frame == ix.STRETCHED:
                 moved = nodes[piece] * local[n - 1] + size * local[n]
             slope += n * coef[piece, i, n] * moved
         load[at + i] += total
-        if frame == MATERIAL:
+        if frame == ix.MATERIAL:
             load_rate[at + i] -= slope / size
-        elif frame == STRETCHED:
+        elif frame == ix.STRETCHED:
             load_rate[at + i] -= slope / (size * depth)
 
 
 @inner
 def add_history(arrays, k, ya, yb, piece, course, load, load_rate):
     """Add what the pieces of the path between ya and yb, inside one piece of the shapes, add to H and dH/dz."""
-    edges, cubics, kept = floats_1(arrays, PATH_EDGES), floats_2(arrays, PATH_CUBICS), floats_2(arrays, PATH_MOMENTS)
-    count, moments = integers_1(arrays, PATH_COUNT)[0], floats_2(arrays, CUT_MOMENTS)[0]
+    edges, cubics, kept = floats_1(arrays, ix.PATH_EDGES), floats_2(arrays, ix.PATH_CUBICS), floats_2(arrays, ix.PATH_MOMENTS)
+    count, moments = integers_1(arrays, ix.PATH_COUNT)[0], floats_2(arrays, ix.CUT_MOMENTS)[0]
     first, last = locate(edges[: count + 1], ya), locate(edges[: count + 1], yb)
     if first == last:
         cubic_moments(cubics[first], ya - edges[first], yb - edges[first], moments)
@@ -183,25 +149,25 @@ def add_history(arrays, k, ya, yb, piece, course, load, load_rate):
 @inner
 def axis_place(node, depth, frame, length):
     """Return y of a node of the shapes."""
-    if frame == MATERIAL:
+    if frame == ix.MATERIAL:
         return node - (length - depth)
-    return node * depth if frame == STRETCHED else node
+    return node * depth if frame == ix.STRETCHED else node
 
 
 @inner
 def add_rest(arrays, is_history, start, stop, cubic, course, load, load_rate):
     """Add H and dH/dz of the path over start < y < stop, up to the tip: its history, or one cubic about ``start``."""
-    switches, layers, nodes = integers_1(arrays, SWITCH), floats_2(arrays, LAYER), floats_1(arrays, PIECE_NODES)
-    moments, length = floats_2(arrays, CUT_MOMENTS)[0], floats_1(arrays, NUMBER)[LENGTH]
-    frame, depth, pieces = switches[FRAME], course[DEPTH], len(nodes) - 1
+    switches, layers, nodes = integers_1(arrays, ix.SWITCH), floats_2(arrays, ix.LAYER), floats_1(arrays, ix.PIECE_NODES)
+    moments, length = floats_2(arrays, ix.CUT_MOMENTS)[0], floats_1(arrays, ix.NUMBER)[ix.LENGTH]
+    frame, depth, pieces = switches[ix.FRAME], course[ix.DEPTH], len(nodes) - 1
     for number in range(layers.shape[0]):
-        layer, k = layers[number], layers[number, MODULUS]
-        if k == 0.0 or not course[SIDE] > layer[LAYER_START]:
+        layer, k = layers[number], layers[number, ix.MODULUS]
+        if k == 0.0 or not course[ix.SIDE] > layer[ix.LAYER_START]:
             continue
-        low, high = max(layer[LAYER_START], start), min(layer[LAYER_END], stop, depth)
+        low, high = max(layer[ix.LAYER_START], start), min(layer[ix.LAYER_END], stop, depth)
         if high <= low:
             continue
-        place = low + (length - depth) if frame == MATERIAL else (low / depth if frame == STRETCHED else low)
+        place = low + (length - depth) if frame == ix.MATERIAL else (low / depth if frame == ix.STRETCHED else low)
         for piece in range(locate(nodes, place), pieces):
             ya = max(low, axis_place(nodes[piece], depth, frame, length))
             yb = high if piece == pieces - 1 else min(high, axis_place(nodes[piece + 1], depth, frame, length))
@@ -219,7 +185,7 @@ def add_rest(arrays, is_history, start, stop, cubic, course, load, load_rate):
 @inner
 def add_answer(arrays, load, load_rate):
     """Add what a model that was asked has answered to H and dH/dz."""
-    answer = floats_2(arrays, ANSWERED_LOAD)
+    answer = floats_2(arrays, ix.ANSWERED_LOAD)
     for i in range(len(load)):
         load[i] += answer[0, i]
         load_rate[i] += answer[1, i]
@@ -228,28 +194,28 @@ def add_answer(arrays, load, load_rate):
 @inner
 def set_history(arrays, at):
     """Set H and dH/dz of the path behind a step at an instant."""
-    edges, cubics, count = floats_1(arrays, PATH_EDGES), floats_2(arrays, PATH_CUBICS), integers_1(arrays, PATH_COUNT)[0]
-    load, load_rate = floats_2(arrays, PATH_LOAD)[at], floats_2(arrays, PATH_LOAD_RATE)[at]
+    edges, cubics, count = floats_1(arrays, ix.PATH_EDGES), floats_2(arrays, ix.PATH_CUBICS), integers_1(arrays, ix.PATH_COUNT)[0]
+    load, load_rate = floats_2(arrays, ix.PATH_LOAD)[at], floats_2(arrays, ix.PATH_LOAD_RATE)[at]
     load[:] = 0.0
     load_rate[:] = 0.0
-    if count > 0 and integers_1(arrays, SWITCH)[GIVEN]:
-        ask(integers_1(arrays, ASKED)[0], at, ASK_HISTORY)
+    if count > 0 and integers_1(arrays, ix.SWITCH)[ix.GIVEN]:
+        ask(integers_1(arrays, ix.ASKED)[0], at, ix.ASK_HISTORY)
         add_answer(arrays, load, load_rate)
     elif count > 0:
-        add_rest(arrays, count > 0, edges[0], edges[count], cubics[0], floats_2(arrays, COURSES)[at], load, load_rate)
+        add_rest(arrays, count > 0, edges[0], edges[count], cubics[0], floats_2(arrays, ix.COURSES)[at], load, load_rate)
 
 
 @inner
 def add_fresh(arrays, at, cubic, load, load_rate):
     """Add what a cubic about the deepest point, the piece that is being cut, adds to H and dH/dz."""
-    course, deepest = floats_2(arrays, COURSES)[at], floats_1(arrays, AXIAL_STATE)[DEEPEST]
-    if course[OWN_DEPTH] > deepest and integers_1(arrays, SWITCH)[GIVEN]:
+    course, deepest = floats_2(arrays, ix.COURSES)[at], floats_1(arrays, ix.AXIAL_STATE)[ix.DEEPEST]
+    if course[ix.OWN_DEPTH] > deepest and integers_1(arrays, ix.SWITCH)[ix.GIVEN]:
         for i in range(4):
-            floats_1(arrays, ANSWERED)[i] = cubic[i]
-        ask(integers_1(arrays, ASKED)[0], at, ASK_FRESH)
+            floats_1(arrays, ix.ANSWERED)[i] = cubic[i]
+        ask(integers_1(arrays, ix.ASKED)[0], at, ix.ASK_FRESH)
         add_answer(arrays, load, load_rate)
-    elif course[OWN_DEPTH] > deepest:
-        add_rest(arrays, course[OWN_DEPTH] < deepest, deepest, course[DEPTH], cubic, course, load, load_rate)
+    elif course[ix.OWN_DEPTH] > deepest:
+        add_rest(arrays, course[ix.OWN_DEPTH] < deepest, deepest, course[ix.DEPTH], cubic, course, load, load_rate)
 
 
 @inner
@@ -278,11 +244,11 @@ def rest_constant(course, count, edges, cubics, squares, layers):
     total = 0.0
     for number in range(layers.shape[0]):
         layer = layers[number]
-        if count > 0 and layer[MODULUS] != 0.0 and course[SIDE] > layer[LAYER_START]:
-            low = max(layer[LAYER_START], edges[0])
-            high = min(layer[LAYER_END], course[DEPTH], edges[count])
+        if count > 0 and layer[ix.MODULUS] != 0.0 and course[ix.SIDE] > layer[ix.LAYER_START]:
+            low = max(layer[ix.LAYER_START], edges[0])
+            high = min(layer[ix.LAYER_END], course[ix.DEPTH], edges[count])
             if high > low:
-                total += 0.5 * layer[MODULUS] * path_square(low, high, count, edges, cubics, squares)
+                total += 0.5 * layer[ix.MODULUS] * path_square(low, high, count, edges, cubics, squares)
     return total
 
 
@@ -292,10 +258,10 @@ def add_tip_rest(rest, course, layers, row, first, load_rate):
     total = 0.0
     for number in range(layers.shape[0]):
         layer = layers[number]
-        if course[SIDE] > layer[LAYER_START] and course[SIDE] <= layer[LAYER_END]:
-            total += 0.5 * layer[MODULUS] * rest * rest
+        if course[ix.SIDE] > layer[ix.LAYER_START] and course[ix.SIDE] <= layer[ix.LAYER_END]:
+            total += 0.5 * layer[ix.MODULUS] * rest * rest
             for i in range(len(row)):
-                load_rate[first + i] += layer[MODULUS] * rest * row[i]
+                load_rate[first + i] += layer[ix.MODULUS] * rest * row[i]
     return total
 
 

@@ -9,23 +9,7 @@ from math import inf, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.dynamics.names import (
-    ANGLE_SIGNAL,
-    DEPTH_SIGNAL,
-    FACTOR_SIGNAL,
-    HUB_SIGNAL,
-    LOAD_SIGNAL,
-    PUSH_SIGNAL,
-    ROW,
-    ROW_AMPLITUDE,
-    ROW_CURVE,
-    ROW_OMEGA,
-    ROW_PHASE,
-    ROW_SLOPE,
-    ROW_START,
-    ROW_SUMMED,
-    ROW_VALUE,
-)
+from fem_needle.dynamics import names as ix
 from fem_needle.loads import turns_with_needle
 from fem_needle.motion import DepthLaw, Instant, depth_law
 from fem_needle.scene import LateralLoad, Scene, Sinusoid, Table, TipLoad, as_function
@@ -71,19 +55,19 @@ def joined(signals: Sequence[Array]) -> Drive:
 def value_rows(value: Value) -> Array:
     """Return the rows of a scene's value."""
     if isinstance(value, Sinusoid):
-        row = np.zeros((1, ROW))
-        row[0, ROW_VALUE], row[0, ROW_AMPLITUDE] = value.mean, value.amplitude
-        row[0, ROW_OMEGA], row[0, ROW_PHASE] = 2 * pi * value.frequency, value.phase
+        row = np.zeros((1, ix.ROW))
+        row[0, ix.ROW_VALUE], row[0, ix.ROW_AMPLITUDE] = value.mean, value.amplitude
+        row[0, ix.ROW_OMEGA], row[0, ix.ROW_PHASE] = 2 * pi * value.frequency, value.phase
         return row
     if not isinstance(value, Table):
-        row = np.zeros((1, ROW))
-        row[0, ROW_VALUE] = float(value)
+        row = np.zeros((1, ix.ROW))
+        row[0, ix.ROW_VALUE] = float(value)
         return row
     times, values = np.array(value.time), np.array(value.values)
-    rows = np.zeros((len(times) + 1, ROW))
-    rows[0, ROW_START], rows[1:, ROW_START] = min(times[0], 0.0) - 1.0, times  # in front of the first point: constant
-    rows[0, ROW_VALUE], rows[1:, ROW_VALUE] = values[0], values
-    rows[1:-1, ROW_SLOPE] = np.diff(values) / np.diff(times)
+    rows = np.zeros((len(times) + 1, ix.ROW))
+    rows[0, ix.ROW_START], rows[1:, ix.ROW_START] = min(times[0], 0.0) - 1.0, times  # in front of the first point: constant
+    rows[0, ix.ROW_VALUE], rows[1:, ix.ROW_VALUE] = values[0], values
+    rows[1:-1, ix.ROW_SLOPE] = np.diff(values) / np.diff(times)
     return rows
 
 
@@ -91,12 +75,12 @@ def summed_rows(start: float, value: Value) -> Array:
     """Return the rows of start + integral of a scene's value from 0 on."""
     rows, function = value_rows(value), as_function(value)
     result = rows.copy()
-    begins = np.maximum(rows[:, ROW_START], 0.0) if isinstance(value, Table) else np.zeros(1)
-    at = rows[:, ROW_VALUE] + rows[:, ROW_SLOPE] * (begins - rows[:, ROW_START])
-    result[:, ROW_START], result[:, ROW_VALUE] = begins, start + function.integral(begins)
-    result[:, ROW_SLOPE], result[:, ROW_CURVE] = at, 0.5 * rows[:, ROW_SLOPE]
+    begins = np.maximum(rows[:, ix.ROW_START], 0.0) if isinstance(value, Table) else np.zeros(1)
+    at = rows[:, ix.ROW_VALUE] + rows[:, ix.ROW_SLOPE] * (begins - rows[:, ix.ROW_START])
+    result[:, ix.ROW_START], result[:, ix.ROW_VALUE] = begins, start + function.integral(begins)
+    result[:, ix.ROW_SLOPE], result[:, ix.ROW_CURVE] = at, 0.5 * rows[:, ix.ROW_SLOPE]
     if isinstance(value, Sinusoid):
-        result[:, ROW_SLOPE], result[:, ROW_SUMMED] = value.mean, 1.0
+        result[:, ix.ROW_SLOPE], result[:, ix.ROW_SUMMED] = value.mean, 1.0
     kept = np.append(np.diff(begins) > 0.0, True)
     return result[kept]
 
@@ -111,18 +95,18 @@ def depth_rows(scene: Scene, law: DepthLaw) -> Array:
     else:
         return value_rows(insertion.first_depth)
     if law.rests_from < inf and insertion.kind == "speed":
-        rows = rows[rows[:, ROW_START] < max(law.rests_from, np.finfo(float).tiny)]
-        final = np.zeros((1, ROW))
-        final[0, ROW_START], final[0, ROW_VALUE] = law.rests_from, insertion.final_depth
+        rows = rows[rows[:, ix.ROW_START] < max(law.rests_from, np.finfo(float).tiny)]
+        final = np.zeros((1, ix.ROW))
+        final[0, ix.ROW_START], final[0, ix.ROW_VALUE] = law.rests_from, insertion.final_depth
         rows = np.concatenate([rows, final])
     return rows
 
 
 def moving_rows(origin: Instant) -> Array:
     """Return the rows of a depth that goes on from an instant with a constant acceleration."""
-    row = np.zeros((1, ROW))
-    row[0, ROW_START], row[0, ROW_VALUE] = origin.time, origin.depth
-    row[0, ROW_SLOPE], row[0, ROW_CURVE] = origin.speed, 0.5 * origin.acceleration
+    row = np.zeros((1, ix.ROW))
+    row[0, ix.ROW_START], row[0, ix.ROW_VALUE] = origin.time, origin.depth
+    row[0, ix.ROW_SLOPE], row[0, ix.ROW_CURVE] = origin.speed, 0.5 * origin.acceleration
     return row
 
 
@@ -131,16 +115,16 @@ def drive_of(scene: Scene) -> Drive:
     support, insertion = scene.support, scene.insertion
     turns = turns_with_needle(scene)
     signals: dict[int, Array] = {
-        DEPTH_SIGNAL: depth_rows(scene, depth_law(scene)),
-        FACTOR_SIGNAL: value_rows(scene.tissue.stiffness_factor),
-        HUB_SIGNAL: value_rows(support.hub_deflection),
-        ANGLE_SIGNAL: value_rows(0.0 if turns else support.hub_angle),
-        PUSH_SIGNAL: value_rows(insertion.push_force or 0.0),
+        ix.DEPTH_SIGNAL: depth_rows(scene, depth_law(scene)),
+        ix.FACTOR_SIGNAL: value_rows(scene.tissue.stiffness_factor),
+        ix.HUB_SIGNAL: value_rows(support.hub_deflection),
+        ix.ANGLE_SIGNAL: value_rows(0.0 if turns else support.hub_angle),
+        ix.PUSH_SIGNAL: value_rows(insertion.push_force or 0.0),
     }
     if support.kind == "entry":
-        signals[HUB_SIGNAL], signals[ANGLE_SIGNAL] = value_rows(0.0), value_rows(0.0)
+        signals[ix.HUB_SIGNAL], signals[ix.ANGLE_SIGNAL] = value_rows(0.0), value_rows(0.0)
     loads = load_rows(scene)
-    return joined([*(signals[number] for number in range(LOAD_SIGNAL)), *loads])
+    return joined([*(signals[number] for number in range(ix.LOAD_SIGNAL)), *loads])
 
 
 def load_rows(scene: Scene) -> list[Array]:

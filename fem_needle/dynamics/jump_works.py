@@ -2,51 +2,10 @@
 
 from __future__ import annotations
 
+from fem_needle.dynamics import names as ix
 from fem_needle.dynamics.arrays import floats_1, floats_2, floats_3, floats_5, integers_1, integers_2
 from fem_needle.dynamics.compilation import inner
 from fem_needle.dynamics.instant import beam_at
-from fem_needle.dynamics.names import (
-    AXIAL_STATE,
-    BEAM,
-    BENDING_STIFFNESS,
-    BOUNDARY,
-    CLAMP,
-    COURSES,
-    COVERED,
-    CUTS,
-    DEGREE,
-    FACTOR,
-    FLEXIBLE,
-    FORCES,
-    GUIDES,
-    HUB_WORK,
-    INSTANT_SUMS,
-    KEPT_HELD,
-    KEPT_LATERAL,
-    KNOWN,
-    LAST_ANGLE_RATE,
-    LAST_AXIAL_MOMENTUM,
-    LAST_HUB_RATE,
-    LATERAL,
-    LEDGER_STATE,
-    LOAD_WORK,
-    NUMBER,
-    PATH_LOAD,
-    PIECE_NODES,
-    POINT_FIRST,
-    POINT_ROWS,
-    PRESCRIBED,
-    RATES,
-    S_MOMENTUM,
-    SIDES,
-    SPEED,
-    START,
-    STRETCH,
-    STRIDE,
-    SWITCH,
-    TISSUE,
-    TISSUE_BLOCKS,
-)
 from fem_needle.dynamics.points import along, deflection_at
 from fem_needle.dynamics.products import bending_form, covered_form
 
@@ -58,21 +17,21 @@ JUMP_FRACTION = 1e-9  # of a step: in this time viscosity lets nothing move
 @inner
 def elastic_energy(arrays, right, left):
     """Return the change of 1/2 q.(K + m G) q - m q.H from one state to another."""
-    switches, course, beams = integers_1(arrays, SWITCH), floats_2(arrays, COURSES)[START], floats_5(arrays, BEAM)
+    switches, course, beams = integers_1(arrays, ix.SWITCH), floats_2(arrays, ix.COURSES)[ix.START], floats_5(arrays, ix.BEAM)
     tissue, covered, load = (
-        floats_5(arrays, TISSUE_BLOCKS)[START],
-        floats_3(arrays, COVERED)[START],
-        floats_2(arrays, PATH_LOAD)[START],
+        floats_5(arrays, ix.TISSUE_BLOCKS)[ix.START],
+        floats_3(arrays, ix.COVERED)[ix.START],
+        floats_2(arrays, ix.PATH_LOAD)[ix.START],
     )
-    beam, nodes, total = beams[beam_at(beams, START)], floats_1(arrays, PIECE_NODES), 0.0
-    stretch, stiffness = course[STRETCH], floats_1(arrays, NUMBER)[BENDING_STIFFNESS]
+    beam, nodes, total = beams[beam_at(beams, ix.START)], floats_1(arrays, ix.PIECE_NODES), 0.0
+    stretch, stiffness = course[ix.STRETCH], floats_1(arrays, ix.NUMBER)[ix.BENDING_STIFFNESS]
     for side in range(2):
         q, sign = right if side == 0 else left, 1.0 if side == 0 else -1.0
-        bent = bending_form(beam, switches[STRIDE], switches[DEGREE], stiffness, nodes, q) / (stretch * stretch * stretch)
-        held = course[FACTOR] * stretch * covered_form(tissue, TISSUE, covered, switches[STRIDE], q, q)
+        bent = bending_form(beam, switches[ix.STRIDE], switches[ix.DEGREE], stiffness, nodes, q) / (stretch * stretch * stretch)
+        held = course[ix.FACTOR] * stretch * covered_form(tissue, ix.TISSUE, covered, switches[ix.STRIDE], q, q)
         total += sign * 0.5 * (bent + held)
-        if switches[CUTS]:
-            total -= sign * course[FACTOR] * along(load, 0, q)
+        if switches[ix.CUTS]:
+            total -= sign * course[ix.FACTOR] * along(load, 0, q)
     return total
 
 
@@ -83,35 +42,47 @@ def force_jump_works(arrays, jumped):
     What resists is the change of bending and tissue energy less what the points do: viscosity takes as much as time is left, and
     stands on neither side.
     """
-    switches, left, held = integers_1(arrays, SWITCH), floats_2(arrays, KEPT_LATERAL)[0], floats_1(arrays, KEPT_HELD)
+    switches, left, held = integers_1(arrays, ix.SWITCH), floats_2(arrays, ix.KEPT_LATERAL)[0], floats_1(arrays, ix.KEPT_HELD)
     rows, first, flexible = (
-        floats_3(arrays, POINT_ROWS)[START],
-        integers_2(arrays, POINT_FIRST)[START],
-        floats_3(arrays, FLEXIBLE)[START],
+        floats_3(arrays, ix.POINT_ROWS)[ix.START],
+        integers_2(arrays, ix.POINT_FIRST)[ix.START],
+        floats_3(arrays, ix.FLEXIBLE)[ix.START],
     )
-    forces, known, ledger = floats_2(arrays, FORCES)[START], floats_2(arrays, KNOWN)[START], floats_1(arrays, LEDGER_STATE)
+    forces, known, ledger = (
+        floats_2(arrays, ix.FORCES)[ix.START],
+        floats_2(arrays, ix.KNOWN)[ix.START],
+        floats_1(arrays, ix.LEDGER_STATE),
+    )
     taken = 0.0
     for point in range(len(forces)):
         mean = 0.5 * (forces[point] + held[point])
         moved = deflection_at(point, rows, first, flexible, known, forces)
-        if point >= switches[GUIDES]:
-            ledger[LOAD_WORK] += mean * (moved - deflection_at(point, rows, first, flexible, left, held))
+        if point >= switches[ix.GUIDES]:
+            ledger[ix.LOAD_WORK] += mean * (moved - deflection_at(point, rows, first, flexible, left, held))
         taken += mean * (along(rows[point], first[point], known) - along(rows[point], first[point], left))
     if jumped:
-        ledger[HUB_WORK] += elastic_energy(arrays, known, left) - taken
+        ledger[ix.HUB_WORK] += elastic_energy(arrays, known, left) - taken
 
 
 @inner
 def momentum_jump_works(arrays, pace, jumped):
     """Add the works at a jump of speed or of the hub's velocity: mean velocity times jump of momentum."""
-    axial, ledger, clamp = floats_1(arrays, AXIAL_STATE), floats_1(arrays, LEDGER_STATE), floats_3(arrays, CLAMP)[START]
-    lateral, left, rates = floats_3(arrays, LATERAL)[0], floats_2(arrays, KEPT_LATERAL), floats_2(arrays, RATES)[START]
-    sums, speed, struck = floats_2(arrays, INSTANT_SUMS)[START], floats_2(arrays, COURSES)[START, SPEED], 0.0
-    ledger[BOUNDARY] += 0.5 * (pace + speed) * (sums[S_MOMENTUM] - axial[LAST_AXIAL_MOMENTUM])
-    rate, turn = 0.5 * (axial[LAST_HUB_RATE] + clamp[1, 0]), 0.5 * (axial[LAST_ANGLE_RATE] + clamp[1, 1])
-    ledger[HUB_WORK] += rate * (lateral[1, 0] - left[1, 0]) + turn * (lateral[1, 1] - left[1, 1])
-    for i in range(integers_1(arrays, SWITCH)[PRESCRIBED], len(rates)):
+    axial, ledger, clamp = (
+        floats_1(arrays, ix.AXIAL_STATE),
+        floats_1(arrays, ix.LEDGER_STATE),
+        floats_3(arrays, ix.CLAMP)[ix.START],
+    )
+    lateral, left, rates = (
+        floats_3(arrays, ix.LATERAL)[0],
+        floats_2(arrays, ix.KEPT_LATERAL),
+        floats_2(arrays, ix.RATES)[ix.START],
+    )
+    sums, speed, struck = floats_2(arrays, ix.INSTANT_SUMS)[ix.START], floats_2(arrays, ix.COURSES)[ix.START, ix.SPEED], 0.0
+    ledger[ix.BOUNDARY] += 0.5 * (pace + speed) * (sums[ix.S_MOMENTUM] - axial[ix.LAST_AXIAL_MOMENTUM])
+    rate, turn = 0.5 * (axial[ix.LAST_HUB_RATE] + clamp[1, 0]), 0.5 * (axial[ix.LAST_ANGLE_RATE] + clamp[1, 1])
+    ledger[ix.HUB_WORK] += rate * (lateral[1, 0] - left[1, 0]) + turn * (lateral[1, 1] - left[1, 1])
+    for i in range(integers_1(arrays, ix.SWITCH)[ix.PRESCRIBED], len(rates)):
         change = lateral[1, i] - left[1, i]
         if change != 0.0:  # a guide's strike, or the momentum that viscous tissue leaves
-            struck += 0.5 * (floats_2(arrays, SIDES)[0, i] + rates[i]) * change
-    ledger[HUB_WORK if jumped else BOUNDARY] += struck
+            struck += 0.5 * (floats_2(arrays, ix.SIDES)[0, i] + rates[i]) * change
+    ledger[ix.HUB_WORK if jumped else ix.BOUNDARY] += struck

@@ -7,20 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fem_needle.dynamics import names as ix
 from fem_needle.dynamics.compilation import inner
 from fem_needle.dynamics.cover import locate, place_of, place_rate, shapes_at, tip_place
-from fem_needle.dynamics.names import (
-    BENDING_STIFFNESS,
-    DEGREE,
-    DEPTH,
-    FIXED,
-    FRAME,
-    LENGTH,
-    MATERIAL,
-    POINTS,
-    STRIDE,
-    TURNS,
-)
 
 BUBBLE_ENERGY = 204.8  # integral of the square of the second derivative of 16 x^2 (1 - x)^2
 
@@ -52,17 +41,17 @@ def kink_rate(first, second, degree):
 @inner
 def set_points(course, nodes, coef, switches, numbers, positions, shape, rows, rates, first, places, flexible, flexible_rate):
     """Set rows N and dN/dz (p, m), first coordinates, B and dB/dz (p, p) at an instant."""
-    frame, length, depth, count = switches[FRAME], numbers[LENGTH], course[DEPTH], switches[POINTS]
-    m, stride = coef.shape[1], switches[STRIDE]
-    ahead = count - 1 - switches[TURNS]  # guides and lateral loads
+    frame, length, depth, count = switches[ix.FRAME], numbers[ix.LENGTH], course[ix.DEPTH], switches[ix.POINTS]
+    m, stride = coef.shape[1], switches[ix.STRIDE]
+    ahead = count - 1 - switches[ix.TURNS]  # guides and lateral loads
     for point in range(count):
-        if point == ahead and switches[TURNS]:
+        if point == ahead and switches[ix.TURNS]:
             first[point], places[point, 0] = 0, -1.0
             for i in range(m):
                 rows[point, i], rates[point, i] = 0.0, 0.0
             rows[point, 1] = 1.0
             continue
-        x, moves = tip_place(depth, frame, length), 1.0 if frame == FIXED else 0.0
+        x, moves = tip_place(depth, frame, length), 1.0 if frame == ix.FIXED else 0.0
         if point < ahead:
             x, moves = place_of(positions[point], depth, frame, length), place_rate(positions[point], depth, frame)
         piece = locate(nodes, x)
@@ -71,8 +60,8 @@ def set_points(course, nodes, coef, switches, numbers, positions, shape, rows, r
         places[point, 1] = (x - nodes[piece]) / (nodes[piece + 1] - nodes[piece])
         for i in range(m):
             rows[point, i], rates[point, i] = shape[0, i], moves * shape[1, i]
-    if stride and frame == MATERIAL and ahead > 0:
-        set_kinks(ahead, nodes, switches[DEGREE], numbers[BENDING_STIFFNESS], places, flexible, flexible_rate)
+    if stride and frame == ix.MATERIAL and ahead > 0:
+        set_kinks(ahead, nodes, switches[ix.DEGREE], numbers[ix.BENDING_STIFFNESS], places, flexible, flexible_rate)
 
 
 @inner

@@ -9,75 +9,63 @@ Bending of elements is left to `fem_needle.dynamics.sweep`, but for the bubble's
 
 from __future__ import annotations
 
+from fem_needle.dynamics import names as ix
 from fem_needle.dynamics.compilation import inner
-from fem_needle.dynamics.names import (
-    BENDING,
-    CENTRIFUGAL,
-    CONVECTED,
-    CONVECTION,
-    DAMPING,
-    DRAG,
-    FACTOR,
-    INERTIA,
-    MASS,
-    SPEED,
-    STRETCH,
-    STRIDE,
-    TISSUE,
-)
 
 
 @inner
 def fill_rest(block, course, constants, tissue, switches, matrix):
     """Set a block's K + m G (m, m)."""
-    m, stretch = constants.shape[2], course[STRETCH]
-    bend, support = 1.0 / (stretch * stretch * stretch), course[FACTOR] * stretch
+    m, stretch = constants.shape[2], course[ix.STRETCH]
+    bend, support = 1.0 / (stretch * stretch * stretch), course[ix.FACTOR] * stretch
     for i in range(m):
         for j in range(m):
-            matrix[i, j] = support * tissue[block, TISSUE, i, j]
-            if switches[STRIDE] == 0:
-                matrix[i, j] += bend * constants[block, BENDING, i, j]
-    if switches[STRIDE] and m == 5:
-        matrix[2, 2] += bend * constants[block, BENDING, 2, 2]
+            matrix[i, j] = support * tissue[block, ix.TISSUE, i, j]
+            if switches[ix.STRIDE] == 0:
+                matrix[i, j] += bend * constants[block, ix.BENDING, i, j]
+    if switches[ix.STRIDE] and m == 5:
+        matrix[2, 2] += bend * constants[block, ix.BENDING, 2, 2]
 
 
 @inner
 def fill_step(block, h, inverse, course, first, second, tissue, is_covered, switches, matrix):
     """Set a block's matrix (2 m, 2 m) of a step; ``first``, ``second``: the beam's matrices (B, 4, m, m) at the nodes."""
-    m, full = first.shape[2], switches[STRIDE] == 0
+    m, full = first.shape[2], switches[ix.STRIDE] == 0
     for s in range(2):
         for o in range(2):
-            mass0 = inverse[s, 0] * inverse[0, o] / (h * h) * course[0, STRETCH] * switches[INERTIA]
-            mass1 = inverse[s, 1] * inverse[1, o] / (h * h) * course[1, STRETCH] * switches[INERTIA]
+            mass0 = inverse[s, 0] * inverse[0, o] / (h * h) * course[0, ix.STRETCH] * switches[ix.INERTIA]
+            mass1 = inverse[s, 1] * inverse[1, o] / (h * h) * course[1, ix.STRETCH] * switches[ix.INERTIA]
             slope = inverse[s, o] / h
             for i in range(m):
                 for j in range(m):
-                    value = mass0 * first[block, MASS, i, j] + mass1 * second[block, MASS, i, j]
+                    value = mass0 * first[block, ix.MASS, i, j] + mass1 * second[block, ix.MASS, i, j]
                     matrix[2 * i + 1 - s, 2 * j + 1 - o] = value
             if is_covered:
                 add_tissue(m, s, o, slope, course[s], tissue[s, block], matrix)
-    if switches[CONVECTED] and switches[INERTIA]:
+    if switches[ix.CONVECTED] and switches[ix.INERTIA]:
         add_convection(m, h, inverse, course, first[block], second[block], matrix)
     for s in range(2):
-        beam, stretch = first if s == 0 else second, course[s, STRETCH]
+        beam, stretch = first if s == 0 else second, course[s, ix.STRETCH]
         bend = 1.0 / (stretch * stretch * stretch)
         if full:
             for i in range(m):
                 for j in range(m):
-                    matrix[2 * i + 1 - s, 2 * j + 1 - s] += bend * beam[block, BENDING, i, j]
+                    matrix[2 * i + 1 - s, 2 * j + 1 - s] += bend * beam[block, ix.BENDING, i, j]
         elif m == 5:
-            matrix[5 - s, 5 - s] += bend * beam[block, BENDING, 2, 2]
+            matrix[5 - s, 5 - s] += bend * beam[block, ix.BENDING, 2, 2]
 
 
 @inner
 def add_tissue(m, s, o, slope, course, tissue, matrix):
     """Add C over the step's length and, on the diagonal, m G + v D."""
-    damping = slope * course[STRETCH]
+    damping = slope * course[ix.STRETCH]
     for i in range(m):
         for j in range(m):
-            value = damping * tissue[DAMPING, i, j]
+            value = damping * tissue[ix.DAMPING, i, j]
             if s == o:
-                value += course[FACTOR] * course[STRETCH] * tissue[TISSUE, i, j] - course[SPEED] * tissue[DRAG, i, j]
+                value += (
+                    course[ix.FACTOR] * course[ix.STRETCH] * tissue[ix.TISSUE, i, j] - course[ix.SPEED] * tissue[ix.DRAG, i, j]
+                )
             matrix[2 * i + 1 - s, 2 * j + 1 - o] += value
 
 
@@ -85,15 +73,15 @@ def add_tissue(m, s, o, slope, course, tissue, matrix):
 def add_convection(m, h, inverse, course, first, second, matrix):
     """Add v S, - v S' and, on the diagonal, - v^2 R."""
     for s in range(2):
-        own, speed = first if s == 0 else second, course[s, SPEED]
-        spin = speed * speed / course[s, STRETCH]
+        own, speed = first if s == 0 else second, course[s, ix.SPEED]
+        spin = speed * speed / course[s, ix.STRETCH]
         for o in range(2):
-            other, slope, ride = first if o == 0 else second, inverse[s, o] / h, course[o, SPEED]
+            other, slope, ride = first if o == 0 else second, inverse[s, o] / h, course[o, ix.SPEED]
             for i in range(m):
                 for j in range(m):
-                    value = slope * (ride * other[CONVECTION, i, j] - speed * own[CONVECTION, j, i])
+                    value = slope * (ride * other[ix.CONVECTION, i, j] - speed * own[ix.CONVECTION, j, i])
                     if s == o:
-                        value -= spin * own[CENTRIFUGAL, i, j]
+                        value -= spin * own[ix.CENTRIFUGAL, i, j]
                     matrix[2 * i + 1 - s, 2 * j + 1 - o] += value
 
 

@@ -13,7 +13,6 @@ QUICK = (
     "collocation, radius 1 (Gauss), elements, entry",
     "collocation, radius 0 (Radau), modes, entry",
     "commanded force, elements, hub",
-    "loop over many runs, vibrations",
 )
 
 
