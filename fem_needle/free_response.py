@@ -1,18 +1,16 @@
-"""How the tip rings after the needle is given a velocity: small dense eigenproblems at a frozen depth, for estimates."""
+"""Vibrations of a needle at a frozen depth: small dense eigenproblems, for estimates and cosines."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, eigh, null_space
+from scipy.linalg import eigh, null_space
 
 from fem_needle import banded
 from fem_needle.plant import Plant
 
 Array = NDArray[np.float64]
 
-RESPONSE_POINTS = 400
-ROUNDING = 1e-15  # of the largest eigenvalue: the smallest cannot be told from less
 
 
 def frozen_matrices(plant: Plant, depth: float, time: float) -> tuple[Array, Array, Array, Array]:
@@ -54,28 +52,3 @@ def natural_frequencies(plant: Plant, depth: float, time: float = 0.0) -> Array:
     """Return the undamped natural frequencies at a frozen depth [rad/s], rising."""
     mass, _, stiffness, _ = frozen_matrices(plant, depth, time)
     return np.sqrt(np.maximum(eigh(stiffness, mass, eigvals_only=True), 0.0))
-
-
-def ringing(plant: Plant, depth: float, time: float, momentum: Array) -> float:
-    """Return the largest |tip deflection| [m] after the needle at rest is given a momentum M q'.
-
-    Without damping all vibrations are in phase one day: the sum of their amplitudes. With it, the largest over two periods.
-    """
-    mass, damping, stiffness, basis = frozen_matrices(plant, depth, time)
-    struck = basis @ momentum[plant.prescribed :]
-    factor, size = cho_factor(mass), len(mass)
-    system = np.zeros((2 * size, 2 * size))
-    system[:size, size:] = np.eye(size)
-    system[size:, :size], system[size:, size:] = -cho_solve(factor, stiffness), -cho_solve(factor, damping)
-    rates, shapes = np.linalg.eig(system)
-    amplitudes = np.linalg.solve(shapes, np.concatenate([np.zeros(size), cho_solve(factor, struck)]).astype(complex))
-    tip = basis @ plant.points(depth).rows[-1, plant.prescribed :]
-    answers = tip @ shapes[:size] * amplitudes
-    if not np.any(damping):
-        return float(np.sum(np.abs(answers)))
-    squares = eigh(stiffness, mass, eigvals_only=True)
-    lowest = float(np.sqrt(max(squares[0], ROUNDING * squares[-1])))
-    times = np.geomspace(1e-4, 1.0, RESPONSE_POINTS) * (4 * np.pi / lowest)
-    decaying = np.minimum(rates.real, 0.0) + 1j * rates.imag  # rounding alone can make a rate grow
-    response = answers @ np.exp(np.outer(decaying, times))
-    return float(np.max(np.abs(response.real)))
