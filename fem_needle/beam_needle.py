@@ -45,7 +45,6 @@ class BeamNeedle(ABC):
     axial_force_acts = True
     largest_spectral_radius = 1.0
     warnings: tuple[str, ...] = ()
-    stiffness_round_off = 0.0
     is_polynomial = True
 
     def __init__(self, scene: Scene, shapes: Shapes, frame: Frame, beam: Beam) -> None:

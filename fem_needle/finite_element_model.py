@@ -24,6 +24,7 @@ VIBRATING = 4.0 / 3.0  # the error of a free vibration over the difference from 
 PILOT_ELEMENTS = 8
 LONGEST_ELEMENT = 4.0  # decay lengths (4 EI / k)^(1/4): meshes of longer ones may agree with each other and be wrong
 SWOLLEN_TIMES = 200  # at which the largest stiffness factor is looked for
+CAREFUL = 1e-6  # of the tip: rounding stays below it on any mesh that is chosen
 GROWN = 2.0  # an error that two finer meshes make larger by this factor is round-off
 
 
@@ -143,10 +144,15 @@ class Meshes:
         return ChosenPlant(self.needle(count), error, warnings, round_off=self.round_off(count), ladder=self)
 
     def round_off(self, count: int) -> float:
-        """Return what rounding costs the largest tip deflection: at rest, or all of an error that more elements make larger."""
+        """Return what rounding costs the largest tip deflection: at rest, or all of an error that more elements make larger.
+
+        Tolerances above `CAREFUL` are far from it: 0.
+        """
         finer = [error for other, error in self._errors.items() if other > count]
         if len(finer) > 1 and min(finer) > GROWN * self.error(count):
             return self.error(count)
+        if self.scene.numerics.tolerance > CAREFUL:
+            return 0.0
         plant = self.needle(count)
         places, tips = instants(plant, MESH_INSTANTS), np.abs(static_tips(plant, MESH_INSTANTS))
         time, depth = places[int(np.argmax(tips))]

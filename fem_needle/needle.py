@@ -68,7 +68,6 @@ class FiniteElementNeedle(BeamNeedle):
         frame: Frame = StretchedFrame() if is_entry else MaterialFrame(scene.needle.length)
         super().__init__(scene, self.mesh, frame, _beam(self.mesh, frame, scene))
         self._flexible = FlexibleMesh(self.mesh)
-        self.stiffness_round_off = self._flexible.stiffness_round_off
 
     def deflection(
         self, coordinates: Array, forces: Array, depth: float | Array, arc_length: Array, derivative: int = 0

@@ -206,8 +206,6 @@ class Plant(Protocol):
         Of the integrator of a moving needle: below 1 where vibrations that a step does not resolve would grow.
     warnings
         What a user should know of the model before trusting it.
-    stiffness_round_off
-        What a tip may lose, relative, to rounding in the stiffness matrix K; equilibria by `Operators.beam` lose nothing.
     is_polynomial
         Whether the polynomials of its shapes say all of it; else the kernel asks it for its matrices at every depth.
     """
@@ -220,7 +218,6 @@ class Plant(Protocol):
     axial_force_acts: bool
     largest_spectral_radius: float
     warnings: tuple[str, ...]
-    stiffness_round_off: float
     is_polynomial: bool
 
     def operators(self, depth: float, time: float) -> Operators:

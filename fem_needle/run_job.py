@@ -85,19 +85,8 @@ def integration(job: Job) -> Integration:
     return integration_of(job.plant, job.scene, job.choice.analysis)
 
 
-def rounding_warnings(job: Job) -> tuple[str, ...]:
-    """Return the warning of a mesh whose stiffness matrix loses more digits in time steps than the tolerance allows."""
-    loss, tolerance = job.plant.stiffness_round_off, job.scene.numerics.tolerance
-    if loss <= tolerance or not integration(job).steps:
-        return ()  # neither steps; frequencies are quotients of energies, which lose less
-    return (
-        f"rounding may cost {loss:.1e} of the tip > numerics.tolerance = {tolerance:g}: time steps subtract element stiffnesses "
-        "12 EI / h^3, which grow with the mesh; use fewer elements",
-    )
-
-
 def _warnings(job: Job) -> list[str]:
-    found = [*job.plant.warnings, *rounding_warnings(job), *job.chosen.warnings]
+    found = [*job.plant.warnings, *job.chosen.warnings]
     radius, asked = spectral_radius(job.plant, job.scene), job.scene.numerics.spectral_radius
     if job.choice.analysis == "dynamic" and radius < asked:
         found.append(

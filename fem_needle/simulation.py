@@ -17,7 +17,7 @@ from fem_needle.mesh_file import mesh_positions
 from fem_needle.models import ChosenPlant, model_family
 from fem_needle.plant import Plant
 from fem_needle.refined_run import run_refined
-from fem_needle.run_job import Job, Nobody, Observer, integration, rounding_warnings, run_live
+from fem_needle.run_job import Job, Nobody, Observer, integration, run_live
 from fem_needle.scene import Scene
 from fem_needle.scene.settings import overriding
 from fem_needle.threads import one_thread
@@ -159,7 +159,7 @@ def _refuse_rounding(scene: Scene, chosen: ChosenPlant) -> None:
 
 def _run(job: Job) -> Trajectory:
     """Run with the given step, or with steps chosen from the differences of trial runs."""
-    for message in (*job.plant.warnings, *rounding_warnings(job)):
+    for message in job.plant.warnings:
         warnings.warn(message, SuspiciousValueWarning, stacklevel=4)
     given, analysis = job.scene.numerics.time_step, job.choice.analysis
     if isinstance(given, float):

@@ -42,7 +42,6 @@ class ProjectedNeedle:
     """
 
     axial_force_acts = True
-    stiffness_round_off = 0.0
     is_polynomial = False
 
     def __init__(self, needle: FiniteElementNeedle, basis: Basis) -> None:

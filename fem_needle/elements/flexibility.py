@@ -27,7 +27,6 @@ from fem_needle.gauss import gauss_rule
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-STIFFNESS_LOSS = 12.0 * np.finfo(float).eps  # times elements (length / smallest one)^3; measured: 12 to 1 eps at 320 to 1000
 CURVATURE_POINTS = 3  # exact for the square of a quartic's curvature
 _HALF_BANDWIDTH = 6  # deflection of one node to the slope of the next
 
@@ -47,11 +46,6 @@ class FlexibleMesh:
     def stiffened(self, bending_stiffness: float) -> FlexibleBeam:
         """Return the beam with a bending stiffness, EI over the cube of the length of the mesh's unit."""
         return FlexibleBeam(self, bending_stiffness)
-
-    @property
-    def stiffness_round_off(self) -> float:
-        """What a tip may lose, relative, where the element stiffness 12 EI / h^3 is used in place of these equations."""
-        return STIFFNESS_LOSS * self.mesh.elements * float(self.length / np.min(self.mesh.lengths)) ** 3
 
     @cached_property
     def length(self) -> float:
