@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fem_needle.choices import likely_duration, longest_period
 from fem_needle.detuning import detuning
 from fem_needle.dynamics.grid import RunEnd, TimeGrid, time_grid
+from fem_needle.dynamics.push import longest_step
 from fem_needle.errors import ComputationError
 from fem_needle.expectation import Expectation, expectation
 from fem_needle.limits import check_steps
@@ -223,7 +224,7 @@ def _find_step(search: _Search, first: _Trial) -> None:
     """Run with ever shorter steps until the estimated error of a run with all outputs is allowed."""
     order = TIME_ORDER if is_undamped(search.job) else TIME_ORDER - 1
     slowest = resolving_step(search.job)
-    runs, differences = [first, search.run(search.job, first.step / 2.0)], list[float]()
+    runs, differences = [first, _finer_run(search, first)], list[float]()
     while True:
         differences.append(difference(*runs[-2:]))
         resolved = runs[-2].step <= slowest
@@ -240,6 +241,17 @@ def _find_step(search: _Search, first: _Trial) -> None:
         runs.append(search.run(search.job, runs[-1].step * ratio, final=search.error <= search.allowed))
     if not runs[-1].is_whole:
         search.run(search.job, runs[-1].step, final=True)
+
+
+def _finer_run(search: _Search, run: _Trial) -> _Trial:
+    """Return a run with half the step, or less where events and outputs alone have made the steps: the same ones show nothing."""
+    step = run.step
+    for _ in range(MOST_RUNS):
+        step /= 2.0
+        finer = search.run(search.job, step)
+        if finer.end.steps > run.end.steps:
+            break
+    return finer
 
 
 def _refuse_rounding(search: _Search, steps: float) -> None:
@@ -307,6 +319,8 @@ def coarsest_step(job: Job) -> float:
     """
     duration, resolving = likely_duration(job.scene), resolving_step(job)
     step = min(duration / FEWEST_STEPS, shortest_period(job.scene) / STEPS_PER_LOAD_PERIOD)
+    if job.scene.insertion.kind == "force":
+        step = min(step, longest_step(job.scene))
     if resolving == inf or not is_undamped(job):
         return min(step, resolving)
     frequency = 2 * pi / (STEPS_PER_NATURAL_PERIOD * resolving)

@@ -15,12 +15,11 @@ from fem_needle.closed_loop.kernel import LoopEngine, LoopPush
 from fem_needle.dynamics import names as at
 from fem_needle.dynamics.engine import DYNAMIC, NUMBERS_OF_A_CALL, REST, failed_step
 from fem_needle.dynamics.massless import massless
-from fem_needle.dynamics.push import STEPS_PER_PERIOD, WHY, run_limits
+from fem_needle.dynamics.push import WHY, longest_step, run_limits
 from fem_needle.dynamics.run import Integration
 from fem_needle.dynamics.state import State
 from fem_needle.errors import ComputationError
 from fem_needle.initial import initial_state
-from fem_needle.motion import shortest_period
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
 from fem_needle.threads import one_thread
@@ -115,7 +114,7 @@ class DrivenNeedle:
         self._engine = LoopEngine(plant, integration.kind, integration.method)
         if scene.insertion.kind == "force" and integration.kind != REST:
             self._push = LoopPush(self._engine, scene, run_limits(scene))
-            self._time_step = min(time_step, shortest_period(scene) / STEPS_PER_PERIOD)
+            self._time_step = min(time_step, longest_step(scene))
         self._same, self._longest = SAME_TIME * self._time_step, max(1, NUMBERS_OF_A_CALL // plant.size) * self._time_step
         self._live, self._axial = self._engine.live, self._engine.live.axial
         self._course, self._drive = Course(plant, self._time_step), CommandedDrive(scene)

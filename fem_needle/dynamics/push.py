@@ -16,6 +16,7 @@ from fem_needle import axial
 from fem_needle.dynamics import names as at
 from fem_needle.dynamics.engine import Engine, failed_step
 from fem_needle.dynamics.state import State
+from fem_needle.motion import shortest_period
 from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene, as_function
 from fem_needle.segments import interfaces
@@ -47,6 +48,11 @@ def run_limits(scene: Scene) -> RunLimits:
     places = [guide.position for guide in scene.support.guides]
     places += [load.position for load in scene.loads if load.kind == "lateral"]
     return RunLimits(scene.insertion.final_depth, length + min([0.0, *places]), "hub-contact")
+
+
+def longest_step(scene: Scene) -> float:
+    """Return the longest step [s] of a push: its swings are looked at often enough to find every stop."""
+    return shortest_period(scene) / STEPS_PER_PERIOD
 
 
 @dataclass

@@ -14,11 +14,11 @@ from fem_needle.dynamics import names as at
 from fem_needle.dynamics.engine import CREEP, DYNAMIC, REST, Engine, failed_step, smooth_stretches
 from fem_needle.dynamics.grid import RunEnd, TimeGrid, ends_by_itself
 from fem_needle.dynamics.massless import massless
-from fem_needle.dynamics.push import STEPS_PER_PERIOD, WHY, Push, run_limits
+from fem_needle.dynamics.push import WHY, Push, longest_step, run_limits
 from fem_needle.dynamics.vibration import Vibration, vibration_samples
 from fem_needle.initial import initial_state
 from fem_needle.limits import check_steps
-from fem_needle.motion import depth_law, shortest_period
+from fem_needle.motion import depth_law
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene
@@ -115,7 +115,7 @@ def _moved(plant: Plant, integration: Integration, grid: TimeGrid) -> Generator[
 
 def _pushed(plant: Plant, integration: Integration, grid: TimeGrid) -> Generator[Samples, None, RunEnd]:
     """Yield the samples of a pushed needle until something ends its run."""
-    longest = shortest_period(plant.scene) / STEPS_PER_PERIOD
+    longest = longest_step(plant.scene)
     check_steps(grid.outputs[-1], longest)
     engine = begun(plant, integration)
     push, outputs, first = Push(engine, plant.scene, run_limits(plant.scene)), set(grid.outputs), True
