@@ -74,8 +74,8 @@ def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
         coarse = pilot()
         effect = 1.0 if shortest_period(scene) < SLOW_PERIODS * longest_period(coarse) else inertia_effect(coarse)
     if analysis == "auto":
-        effect = inertia_effect(pilot())
         allowed = INERTIA_SHARE * numerics.tolerance
+        effect = inertia_effect(pilot(), enough=allowed)
         analysis = "quasi-static" if effect <= allowed else "dynamic"
         leaves_out = analysis == "quasi-static"
         if leaves_out:

@@ -17,14 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.collocation import collocation
-from fem_needle.dynamics.engine import DYNAMIC
+from fem_needle.dynamics.engine import DYNAMIC, REST
 from fem_needle.dynamics.grid import TimeGrid
 from fem_needle.dynamics.run import Integration, run_samples, without_inertia
 from fem_needle.free_response import natural_frequencies
 from fem_needle.limits import check_swings
-from fem_needle.motion import depth_law, landing_times, run_duration, shortest_period
+from fem_needle.motion import depth_law, landing_times, lateral_values, run_duration, shortest_period
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import joined
+from fem_needle.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,7 @@ STEPS_PER_SWING, SWINGS = 20, 1.6  # behind a kink: of the slowest vibration, wh
 SLIVER = 1e-6  # of the run: kinks nearer to each other are one
 SHALLOW = 0.02  # of the length: shallower `entry` needles are too stiff to matter
 FASTER = 1.3  # what the faster vibrations add to the slowest, whose peaks may lie between two steps
+ROUGH = 10.0  # times a bound from the tip alone
 SUDDEN = 2.0  # a load that comes at once moves an oscillator twice as far as one that comes slowly
 DECAYED = 0.2  # of the first swing is left at the end of the short steps: the tissue damps it
 
@@ -47,19 +49,49 @@ class _Kink:
     frequency: float
 
 
-def inertia_effect(plant: Plant) -> float:
+def inertia_effect(plant: Plant, enough: float = 0.0) -> float:
     """Return how far inertia moves the tip at most, relative to the largest tip deflection.
 
     2 max |e| where steps are long, plus what every kink adds to that while they are short: the sum of all vibrations that stay,
     as they grow while the needle moves on, or the largest of those that decay. Loads that vibrate faster than the needle make it
     of order one by themselves.
+
+    Parameters
+    ----------
+    plant
+        A coarse one.
+    enough
+        Where the motion without inertia is so slow that a rough bound is below this, that is returned.
     """
     scene = plant.scene
     if scene.initial.shape != "equilibrium":
         return inf
     kinks = _kinks(plant)
     grid, is_short = _grid(plant, kinks)
-    time, difference, largest = _difference(plant, grid)
+    slow = _tips(plant, grid, without_inertia(scene))
+    largest = max(float(np.max(np.abs(slow))), scene.numerics.absolute_tolerance)
+    if without_inertia(scene).kind == REST:
+        bound = _slow_bound(plant, kinks, np.array(grid.outputs), slow) / largest
+        if bound <= enough:
+            return bound
+    fast = _tips(plant, grid, Integration(DYNAMIC, collocation(0.0)))
+    return _bound(scene, kinks, np.array(grid.outputs), is_short, np.abs(fast - slow)) / largest
+
+
+def _slow_bound(plant: Plant, kinks: Sequence[_Kink], time: Array, tips: Array) -> float:
+    """Return a rough bound [m] from the tips of equilibria: w'' / omega^2, and jumps of w' / omega, ten times over."""
+    frequency = min(kink.frequency for kink in kinks)
+    slopes, spans = np.diff(tips) / np.diff(time), np.diff(time)
+    turns, at_kink = np.abs(np.diff(slopes)), np.isin(time[1:-1], [kink.time for kink in kinks])
+    bent = np.max(turns[~at_kink] / (0.5 * (spans[1:] + spans[:-1])[~at_kink]), initial=0.0) / frequency**2
+    struck = float(np.sum(turns[at_kink])) / frequency
+    if not all(isinstance(value, float) for value in lateral_values(plant.scene)):  # whose rates are not in the start
+        struck += abs(float(slopes[0])) / frequency
+    return ROUGH * (float(bent) + struck)
+
+
+def _bound(scene: Scene, kinks: Sequence[_Kink], time: Array, is_short: NDArray[np.bool_], difference: Array) -> float:
+    """Return the bound [m] from what inertia moves the tip by at times [s]."""
     forced, staying, passing = 0.0, 0.0, 0.0
     for number, (kink, following) in enumerate(pairwise(kinks)):
         inside = (time >= kink.time) & (time <= following.time)
@@ -73,7 +105,7 @@ def inertia_effect(plant: Plant) -> float:
             passing = max(passing, swing)
         else:
             staying += swing * _growth(kink, kinks[number + 1 :], is_growing=scene.support.kind == "entry")
-    return (SUDDEN * forced + staying + passing) / max(largest, scene.numerics.absolute_tolerance)
+    return SUDDEN * forced + staying + passing
 
 
 def _growth(kink: _Kink, later: Sequence[_Kink], *, is_growing: bool) -> float:
@@ -124,10 +156,8 @@ def _grid(plant: Plant, kinks: Sequence[_Kink]) -> tuple[TimeGrid, NDArray[np.bo
     return TimeGrid(tuple(times), landings, duration), np.array(is_short)
 
 
-def _difference(plant: Plant, grid: TimeGrid) -> tuple[Array, Array, float]:
-    """Return times [s], what inertia moves the tip by at them [m], and the largest tip deflection without it [m]."""
-    length, tips = np.array([plant.scene.needle.length]), []
-    for integration in (Integration(DYNAMIC, collocation(0.0)), without_inertia(plant.scene)):
-        samples = joined(list(run_samples(plant, integration, grid)))
-        tips.append(plant.deflection(samples.coordinates, samples.point_forces, samples.depth, length)[:, 0])
-    return np.array(grid.outputs), np.abs(tips[0] - tips[1]), float(np.max(np.abs(tips[1])))
+def _tips(plant: Plant, grid: TimeGrid, integration: Integration) -> Array:
+    """Return the tip deflections [m] at all steps."""
+    samples = joined(list(run_samples(plant, integration, grid)))
+    length = np.array([plant.scene.needle.length])
+    return plant.deflection(samples.coordinates, samples.point_forces, samples.depth, length)[:, 0]

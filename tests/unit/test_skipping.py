@@ -67,6 +67,13 @@ def test_the_bound_covers_what_a_jump_of_the_bevel_force_sets_ringing(kind):
     assert effect <= inertia_effect(FiniteElementNeedle(slow, elements=6)) < 2.0 * effect
 
 
+@pytest.mark.parametrize("speed", [1e-3, 0.05, 0.4])
+def test_the_rough_bound_of_slow_needles_is_a_bound(speed):
+    plant = FiniteElementNeedle(scene_of("entry", moving(speed, 0.06, 0.08), duration=0.02 / speed), elements=6)
+    assert inertia_effect(plant) <= inertia_effect(plant, enough=1.0) < 30.0 * inertia_effect(plant)
+    assert inertia_effect(plant, enough=1e-15) == inertia_effect(plant)
+
+
 def test_a_ramp_that_takes_no_time_sets_it_ringing():
     force = Table(time=[0.0, 500.0, 500.0001], value=[0.0, 0.0, 0.1])
     scene = scene_of("entry", held(0.1), GEL, [TipLoad(force=force)], duration=1000.0)
