@@ -14,7 +14,7 @@ from fem_needle.dynamics.rests import tips_at_rest
 from fem_needle.dynamics.vibration import needs_no_steps, vibrating_tips
 from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
-from fem_needle.inertia_effect import POINTS_PER_PERIOD, inertia_effect
+from fem_needle.inertia_effect import POINTS_PER_PERIOD, Inertia, inertia_of
 from fem_needle.limits import check_samples
 from fem_needle.loads import load_cases
 from fem_needle.motion import PUSH_SLACK, depth_law, lateral_values, run_duration, shortest_period
@@ -31,6 +31,7 @@ SLOW_PERIODS = 10  # longest natural periods: loads that swing faster are taken 
 HISTORY_POINTS = (400, 2000)  # fewest and most instants at which vibrations of two plants are compared: the outputs else
 OUTPUTS = 200
 STEPS_PER_PERIOD = 16
+VIBRATION_SHARE = 0.5  # of the tolerance: smaller vibrations need not be resolved
 SHALLOW = 0.02  # of the length: shallower `entry` needles are too stiff to matter
 
 
@@ -47,9 +48,12 @@ class Choice:
     skipped
         What is left out and why.
     inertia_error
-        Bound on what leaving inertia out costs the tip, relative to its largest deflection.
+        Bound on what leaving out inertia, or vibrations, costs the tip, relative to its largest deflection.
     vibration
-        How far inertia moves the tip at most, relative to its largest deflection; 1 where that was not looked at.
+        How far inertia moves the tip at most, relative to its largest deflection, vibrations that the tissue damps at once left
+        out; 1 where that was not looked at.
+    passes_over
+        Whether steps need not follow vibrations, because the tissue damps them: an L-stable method passes over them.
     """
 
     analysis: str
@@ -57,6 +61,7 @@ class Choice:
     skipped: tuple[Skipped, ...]
     inertia_error: float
     vibration: float = 1.0
+    passes_over: bool = False
 
 
 def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
@@ -67,25 +72,38 @@ def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
     check_samples(duration, step, stations=numerics.output_points)
     if step > duration:
         raise SceneError(f"numerics.output_step: longer than the run (got {step:g}; allowed up to {duration:g} s)")
-    analysis, skipped, effect, leaves_out = numerics.analysis, tuple(unneeded_terms(scene)), 1.0, False
+    analysis, skipped, leaves_out = numerics.analysis, tuple(unneeded_terms(scene)), False
+    effect = Inertia(1.0, 1.0)
     if analysis == "auto" and scene.insertion.kind == "force":
         analysis = "dynamic"
     elif analysis == "dynamic" and _chooses_steps(scene):
         coarse = pilot()
-        effect = 1.0 if shortest_period(scene) < SLOW_PERIODS * longest_period(coarse) else inertia_effect(coarse)
+        if shortest_period(scene) >= SLOW_PERIODS * longest_period(coarse):
+            effect = inertia_of(coarse)
     if analysis == "auto":
         allowed = INERTIA_SHARE * numerics.tolerance
-        effect = inertia_effect(pilot(), enough=allowed)
-        analysis = "quasi-static" if effect <= allowed else "dynamic"
+        effect = inertia_of(pilot(), enough=allowed)
+        analysis = "quasi-static" if effect.bound <= allowed else "dynamic"
         leaves_out = analysis == "quasi-static"
         if leaves_out:
-            reason = f"moves the tip by at most {effect:.1e} of its largest deflection (allowed {allowed:.1e})"
+            reason = f"moves the tip by at most {effect.bound:.1e} of its largest deflection (allowed {allowed:.1e})"
             skipped = (Skipped("inertia", reason), *skipped)
     elif analysis != "dynamic":
         skipped = (Skipped("inertia", f"analysis = '{analysis}' was asked for"), *skipped)
     if analysis == "dynamic" and numerics.time_step == "auto" and needs_no_steps(scene):
         skipped = (*skipped, Skipped("time steps", "held, undamped, under constant loads: eigenvectors once, then cosines"))
-    return Choice(analysis, step, skipped, effect if leaves_out else 0.0, min(effect, 1.0))
+    passes_over = analysis == "dynamic" and _may_pass_over(scene) and effect.lasting <= VIBRATION_SHARE * numerics.tolerance
+    if passes_over:
+        reason = f"the tissue damps them; what lasts moves the tip by at most {effect.lasting:.1e} of its largest deflection"
+        skipped = (Skipped("steps that follow vibrations", reason), *skipped)
+    left_out = effect.bound if leaves_out else effect.lasting if passes_over else 0.0
+    return Choice(analysis, step, skipped, left_out, min(effect.lasting, 1.0), passes_over)
+
+
+def _may_pass_over(scene: Scene) -> bool:
+    """Return whether steps and their method are free, and there is something that damps vibrations."""
+    is_free = _chooses_steps(scene) and "spectral_radius" not in scene.numerics.model_fields_set
+    return is_free and any(layer.damping > 0.0 for layer in scene.tissue.layers)
 
 
 def likely_duration(scene: Scene) -> float:

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 PILOT_POINTS = 200  # long steps of the pilot
 POINTS_PER_PERIOD = 24  # of a load
-STEPS_PER_SWING, SWINGS = 20, 1.6  # behind a kink: of the slowest vibration, which has been to both sides by then
+STEPS_PER_SWING, SWINGS = 16, 4.0  # behind a kink: of the slowest vibration
 SLIVER = 1e-6  # of the run: kinks nearer to each other are one
 SHALLOW = 0.02  # of the length: shallower `entry` needles are too stiff to matter
 FASTER = 1.3  # what the faster vibrations add to the slowest, whose peaks may lie between two steps
@@ -49,8 +49,29 @@ class _Kink:
     frequency: float
 
 
+@dataclass(frozen=True)
+class Inertia:
+    """What inertia does, relative to the largest tip deflection.
+
+    Attributes
+    ----------
+    bound
+        How far it moves the tip at most.
+    lasting
+        The same without vibrations that the tissue damps within a swing or two.
+    """
+
+    bound: float
+    lasting: float
+
+
 def inertia_effect(plant: Plant, enough: float = 0.0) -> float:
-    """Return how far inertia moves the tip at most, relative to the largest tip deflection.
+    """Return how far inertia moves the tip at most, relative to the largest tip deflection: the bound of `inertia_of`."""
+    return inertia_of(plant, enough).bound
+
+
+def inertia_of(plant: Plant, enough: float = 0.0) -> Inertia:
+    """Return what inertia does to the tip.
 
     2 max |e| where steps are long, plus what every kink adds to that while they are short: the sum of all vibrations that stay,
     as they grow while the needle moves on, or the largest of those that decay. Loads that vibrate faster than the needle make it
@@ -65,7 +86,7 @@ def inertia_effect(plant: Plant, enough: float = 0.0) -> float:
     """
     scene = plant.scene
     if scene.initial.shape != "equilibrium":
-        return inf
+        return Inertia(inf, inf)
     kinks = _kinks(plant)
     grid, is_short = _grid(plant, kinks)
     slow = _tips(plant, grid, without_inertia(scene))
@@ -73,9 +94,10 @@ def inertia_effect(plant: Plant, enough: float = 0.0) -> float:
     if without_inertia(scene).kind == REST:
         bound = _slow_bound(plant, kinks, np.array(grid.outputs), slow) / largest
         if bound <= enough:
-            return bound
+            return Inertia(bound, bound)
     fast = _tips(plant, grid, Integration(DYNAMIC, collocation(0.0)))
-    return _bound(scene, kinks, np.array(grid.outputs), is_short, np.abs(fast - slow)) / largest
+    lasting, passing = _bounds(scene, kinks, np.array(grid.outputs), is_short, np.abs(fast - slow))
+    return Inertia((lasting + passing) / largest, lasting / largest)
 
 
 def _slow_bound(plant: Plant, kinks: Sequence[_Kink], time: Array, tips: Array) -> float:
@@ -90,8 +112,10 @@ def _slow_bound(plant: Plant, kinks: Sequence[_Kink], time: Array, tips: Array) 
     return ROUGH * (float(bent) + struck)
 
 
-def _bound(scene: Scene, kinks: Sequence[_Kink], time: Array, is_short: NDArray[np.bool_], difference: Array) -> float:
-    """Return the bound [m] from what inertia moves the tip by at times [s]."""
+def _bounds(
+    scene: Scene, kinks: Sequence[_Kink], time: Array, is_short: NDArray[np.bool_], difference: Array
+) -> tuple[float, float]:
+    """Return bounds [m] of what lasts and of what passes, from what inertia moves the tip by at times [s]."""
     forced, staying, passing = 0.0, 0.0, 0.0
     for number, (kink, following) in enumerate(pairwise(kinks)):
         inside = (time >= kink.time) & (time <= following.time)
@@ -101,11 +125,11 @@ def _bound(scene: Scene, kinks: Sequence[_Kink], time: Array, is_short: NDArray[
         if not len(short):
             continue
         swing = FASTER * max(float(np.max(short)) - level, 0.0)
-        if float(np.max(short[-len(short) // 3 :])) - level < DECAYED * swing:
+        if float(np.max(short[-len(short) // 4 :])) - level < DECAYED * swing:
             passing = max(passing, swing)
         else:
             staying += swing * _growth(kink, kinks[number + 1 :], is_growing=scene.support.kind == "entry")
-    return SUDDEN * forced + staying + passing
+    return SUDDEN * forced + staying, passing
 
 
 def _growth(kink: _Kink, later: Sequence[_Kink], *, is_growing: bool) -> float:

@@ -6,6 +6,7 @@ which step is needed; the next run takes it. Derivation: docs/theory.md, "What m
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil, floor, inf, pi, sqrt
@@ -13,8 +14,9 @@ from math import ceil, floor, inf, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.choices import likely_duration, longest_period
+from fem_needle.choices import VIBRATION_SHARE, likely_duration, longest_period
 from fem_needle.detuning import detuning
+from fem_needle.dynamics.engine import CREEP
 from fem_needle.dynamics.grid import RunEnd, TimeGrid, time_grid
 from fem_needle.dynamics.push import longest_step
 from fem_needle.errors import ComputationError
@@ -28,6 +30,7 @@ from fem_needle.trajectory import Trajectory, guide_advice
 Array = NDArray[np.float64]
 
 FEWEST_STEPS = 25  # of the coarsest trial run
+BEHIND_KINKS = 3  # outputs behind a kink at which runs with long steps are compared
 FEWEST_SAMPLES = 50  # of a finer run: instants at which runs are compared
 STEPS_PER_LOAD_PERIOD = 4  # of the coarsest trial run
 STEPS_PER_NATURAL_PERIOD = 1.5  # with which vibrations are resolved
@@ -40,7 +43,6 @@ MOST_FAILURES = 5
 AIM = 0.9  # of the allowed error
 LEAST_TIME_SHARE = 0.5  # of the tolerance
 MESH_SHARE = 0.3  # of the tolerance: what the mesh may cost in motion
-VIBRATION_SHARE = 0.5  # of the tolerance: smaller vibrations need not be resolved
 TIME_ORDER = 4.0  # of the integrator with a spectral radius of 1, otherwise 3
 LEAST_FINER = 1.3  # times as many elements: a mesh to compare with
 SURE_ORDER = 3.0  # of the mesh's error in motion, at least
@@ -122,7 +124,9 @@ class _Search:
         ComputationError
             With the trajectory so far.
         """
-        grid, blocks = sampled_grid(job, min(step, job.choice.output_step) if final else step), list[Samples]()
+        first = self.trials[0].grid if self.trials else None
+        grid = replace(sampled_grid(job, min(step, job.choice.output_step) if final else step), coarser=first)
+        blocks = list[Samples]()
         try:
             end = collect(job, grid, blocks, live=False)
         except ComputationError:
@@ -303,6 +307,11 @@ def is_undamped(job: Job) -> bool:
     return method is not None and abs(float(np.sum(method.nodes)) - 1.0) < 1e-12
 
 
+def is_graded(job: Job) -> bool:
+    """Return whether the needle relaxes behind kinks, so that steps have to begin short there."""
+    return job.scene.insertion.kind != "force" and (job.choice.passes_over or integration(job).kind == CREEP)
+
+
 def resolving_step(job: Job) -> float:
     """Return the longest step [s] that resolves the slowest vibration, infinite where none matters."""
     if job.choice.analysis != "dynamic" or job.choice.vibration <= VIBRATION_SHARE * job.scene.numerics.tolerance:
@@ -330,14 +339,19 @@ def coarsest_step(job: Job) -> float:
 def sampled_grid(job: Job, step: float) -> TimeGrid:
     """Return the grid of a trial run with steps of at most ``step`` [s], which samples often enough to be compared.
 
-    Long steps skip outputs, short ones divide them evenly.
+    Long steps skip outputs, but for those next to kinks; short ones divide them evenly. Steps without inertia, or over vibrations
+    that the tissue damps, are graded behind kinks.
     """
     output, duration = job.choice.output_step, likely_duration(job.scene)
     check_steps(duration, step)
-    grid = time_grid(job.plant, output, output)
+    grid = replace(time_grid(job.plant, output, output), is_graded=is_graded(job))
     if step >= output * (1 - 1e-9):
         every = max(1, floor(step / output * (1 + 1e-9)))
-        return TimeGrid((*grid.outputs[:-1:every], grid.outputs[-1]), grid.landings, every * output)
+        chosen = {*range(0, len(grid.outputs), every), len(grid.outputs) - 1}
+        for landing in grid.landings:  # where a run has most to go wrong
+            first = bisect_right(grid.outputs, landing)
+            chosen |= set(range(first, min(first + BEHIND_KINKS, len(grid.outputs))))
+        return replace(grid, outputs=tuple(grid.outputs[index] for index in sorted(chosen)), time_step=every * output)
     parts = ceil(output / step * (1 - 1e-9))
     between = ceil(parts / ceil(FEWEST_SAMPLES * output / duration))  # steps from sample to sample
     samples = ceil(parts / between)
@@ -347,7 +361,7 @@ def sampled_grid(job: Job, step: float) -> TimeGrid:
         inner = np.linspace(start, end, count + 1)[1:-1].tolist()
         times += [time for time in inner if not grid.has_landing(time, 1e-9 * output)]
         times.append(end)
-    return TimeGrid(tuple(times), grid.landings, output / (samples * between))
+    return replace(grid, outputs=tuple(times), time_step=output / (samples * between))
 
 
 def _show(search: _Search) -> Trajectory:

@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 from fem_needle.choices import Choice
+from fem_needle.collocation import collocation
+from fem_needle.dynamics.engine import DYNAMIC
 from fem_needle.dynamics.grid import RunEnd, TimeGrid, time_grid
 from fem_needle.dynamics.run import VIBRATION, Integration, integration_of, run_samples, spectral_radius
 from fem_needle.dynamics.vibration import needs_no_steps
@@ -82,6 +84,8 @@ def integration(job: Job) -> Integration:
     """Return how the needle gets from one time to the next."""
     if job.choice.analysis == "dynamic" and job.scene.numerics.time_step == "auto" and needs_no_steps(job.plant.scene):
         return Integration(VIBRATION)
+    if job.choice.passes_over:
+        return Integration(DYNAMIC, collocation(0.0))
     return integration_of(job.plant, job.scene, job.choice.analysis)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from math import ceil
 
@@ -14,6 +15,9 @@ from fem_needle.limits import check_samples, check_steps
 from fem_needle.motion import depth_law, landing_times, run_duration
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene
+
+HALVINGS = 10  # of the first step behind a kink
+GRADES = tuple(pairwise([0.0, *(2.0**-power for power in range(HALVINGS, -1, -1))]))
 
 
 @dataclass(frozen=True)
@@ -28,17 +32,45 @@ class TimeGrid:
         Times at which something has a kink; a step ends there.
     time_step
         Largest step.
+    is_graded
+        Whether the first step behind a kink is taken in parts that grow from a thousandth of it.
+    coarser
+        A grid whose own steps are all to be shortened as its largest step is: near kinks and outputs, too.
     """
 
     outputs: tuple[float, ...]
     landings: tuple[float, ...]
     time_step: float
+    is_graded: bool = False
+    coarser: TimeGrid | None = None
 
     def intervals(self) -> Iterator[tuple[float, float, int]]:
         """Yield (start, end, steps) between successive outputs and landings."""
-        marks = sorted({*self.outputs, *self.landings})
+        marks, kinks = sorted({*self.outputs, *self.landings}), {0.0, *self.landings}
         for start, end in pairwise(marks):
-            yield start, end, max(1, ceil((end - start) / self.time_step - 1e-9))
+            count = max(1, ceil((end - start) / self._longest(0.5 * (start + end)) - 1e-9))
+            if self.is_graded and start in kinks:
+                step = (end - start) / count
+                for part in GRADES:
+                    yield start + part[0] * step, start + part[1] * step if count > 1 or part[1] < 1.0 else end, 1
+                if count > 1:
+                    yield start + step, end, count - 1
+            else:
+                yield start, end, count
+
+    def _longest(self, time: float) -> float:
+        """Return how long a step may be at a time [s]."""
+        if self.coarser is None:
+            return self.time_step
+        ends, steps = self.coarser.plain_steps
+        there = steps[min(bisect_left(ends, time), len(steps) - 1)]
+        return min(self.time_step, there * self.time_step / self.coarser.time_step)
+
+    @cached_property
+    def plain_steps(self) -> tuple[list[float], list[float]]:
+        """Ends of the intervals and the steps in them [s], not graded."""
+        found = [(end, (end - start) / count) for start, end, count in replace(self, is_graded=False).intervals()]
+        return [end for end, _ in found], [step for _, step in found]
 
     def has_landing(self, time: float, distance: float) -> bool:
         """Return whether there is a landing within a distance of a time [s]."""
