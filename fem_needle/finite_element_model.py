@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fem_needle.choices import instants, static_tips, tip_difference, tip_differences
+from fem_needle.choices import instants, static_tips, tip_difference
 from fem_needle.dynamics.vibration import needs_no_steps
 from fem_needle.errors import SceneError
 from fem_needle.models import ChosenPlant
@@ -14,6 +15,8 @@ from fem_needle.needle import FiniteElementNeedle
 from fem_needle.plant import Plant
 from fem_needle.rounding import round_off
 from fem_needle.scene import Scene, as_function
+
+Array = NDArray[np.float64]
 
 ELEMENT_CHOICES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 ELEMENT_SHARE = 0.1  # of the tolerance: what the mesh may cost
@@ -74,6 +77,7 @@ class Meshes:
     analysis: str
     _needles: dict[int, FiniteElementNeedle] = field(default_factory=dict)
     _errors: dict[int, float] = field(default_factory=dict)
+    _tips: dict[Plant, Array] = field(default_factory=dict)
 
     def error(self, elements: int) -> float:
         """Return the difference of the tip from that of twice as many elements, relative to the largest tip deflection."""
@@ -94,7 +98,14 @@ class Meshes:
         """
         if self._needs_no_steps:
             return VIBRATING * tip_difference(self.scene, plant, finer, self.analysis)
-        return BETWEEN * float(np.max(tip_differences(self.scene, plant, finer, MESH_INSTANTS)))
+        coarse, fine = self._tips_at_rest(plant), self._tips_at_rest(finer)
+        scale = max(float(np.max(np.abs(fine))), self.scene.numerics.absolute_tolerance)
+        return BETWEEN * float(np.max(np.abs(coarse - fine))) / scale
+
+    def _tips_at_rest(self, plant: Plant) -> Array:
+        if plant not in self._tips:
+            self._tips[plant] = static_tips(plant, MESH_INSTANTS)
+        return self._tips[plant]
 
     @property
     def _needs_no_steps(self) -> bool:
@@ -154,7 +165,7 @@ class Meshes:
         if self.scene.numerics.tolerance > CAREFUL:
             return 0.0
         plant = self.needle(count)
-        places, tips = instants(plant, MESH_INSTANTS), np.abs(static_tips(plant, MESH_INSTANTS))
+        places, tips = instants(plant, MESH_INSTANTS), np.abs(self._tips_at_rest(plant))
         time, depth = places[int(np.argmax(tips))]
         return round_off(plant, depth, time, stepped=self.analysis == "dynamic" or plant.foundation.is_damped)
 

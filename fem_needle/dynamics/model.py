@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import comb
 from typing import Any, TypeGuard
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,10 @@ class Model:
         return self.arrays[at.SWITCH]
 
 
+# Made once for each needle; gone with it.
+_CONSTANTS: WeakKeyDictionary[BeamNeedle, dict[int, NDArray[Any]]] = WeakKeyDictionary()
+
+
 def is_known(plant: Plant) -> TypeGuard[BeamNeedle]:
     """Return whether a plant's shapes are polynomials that say all of it: else the kernel asks it for its matrices."""
     return isinstance(plant, BeamNeedle) and plant.is_polynomial
@@ -58,12 +63,21 @@ def is_known(plant: Plant) -> TypeGuard[BeamNeedle]:
 
 def model_of(plant: BeamNeedle, *, inertia: bool, viscous: bool = True) -> Model:
     """Return the arrays of a needle; without viscosity, or without inertia, where these are left out."""
+    if plant not in _CONSTANTS:
+        _CONSTANTS[plant] = _constant_arrays(plant)
+    arrays = _CONSTANTS[plant]
+    switches = arrays[at.SWITCH].copy()
+    switches[at.INERTIA], switches[at.VISCOUS] = inertia, viscous and plant.foundation.is_damped
+    return Model(plant.size, int(switches[at.POINTS]), arrays | {at.SWITCH: switches})
+
+
+def _constant_arrays(plant: BeamNeedle) -> dict[int, NDArray[Any]]:
+    """Return the arrays of a needle that nothing writes to: all its engines may share them."""
     scene, polynomials = plant.scene, plant.shapes.polynomials()
     frame = _frame_of(plant)
     units = _unit_integrals(plant.shapes, polynomials, 1 if frame == at.STRETCHED else 0)
     constants = _beam_matrices(plant, polynomials, units, frame)
     switches = _switches(plant, polynomials, frame)
-    switches[at.INERTIA], switches[at.VISCOUS] = inertia, viscous and plant.foundation.is_damped
     sums = np.zeros((1, 4, 1, 1))
     if polynomials.stride == 0:
         sums = np.concatenate([np.zeros((1, *units.shape[1:])), np.cumsum(units, axis=0)])
@@ -87,7 +101,7 @@ def model_of(plant: BeamNeedle, *, inertia: bool, viscous: bool = True) -> Model
         at.UNIT_SUMS: sums,
         at.BEAM: constants,
     }
-    return Model(plant.size, int(switches[at.POINTS]), {name: np.ascontiguousarray(array) for name, array in arrays.items()})
+    return {name: np.ascontiguousarray(array) for name, array in arrays.items()}
 
 
 def _frame_of(plant: BeamNeedle) -> int:
