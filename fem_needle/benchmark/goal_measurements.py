@@ -5,20 +5,22 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
+import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from math import log2
 from statistics import median
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle import load_scene
 from fem_needle.batch.many import simulate_many
 from fem_needle.benchmark.cases import Case, cases_of
-from fem_needle.benchmark.loop import whole_loop, whole_run
+from fem_needle.benchmark.library_elements import NaiveElements
+from fem_needle.benchmark.loop import quietly, whole_loop, whole_run
 from fem_needle.benchmark.machine import load
 from fem_needle.benchmark.methods import Setting
 from fem_needle.benchmark.own_methods import AssumedModes, FixedElements, ToleranceElements
@@ -28,17 +30,20 @@ from fem_needle.benchmark.result import Row
 from fem_needle.benchmark.timing import seconds
 from fem_needle.errors import NeedleError
 from fem_needle.models import build_plant
+from fem_needle.scene_file import load_scene
+from fem_needle.simulation import simulate
 
 Array = NDArray[np.float64]
 
 ELEMENTS, STEP = 40, 5e-4  # s
-LOOP_ROUNDS = 7
+ROUNDS = 7
 HIT_RATE = 99.0  # %
 BATCH, FEW = 200, 4
 BUSY = 1.5  # processes: what a benchmark alone stays below
 MODULUS = "tissue.layers.0.foundation_modulus"
 PROCESS_ROUNDS = 5
 MICROSECONDS = 1e6
+NAIVE = Setting(elements=ELEMENTS, time_step=1e-2)  # of the naive program, on M
 
 
 @dataclass(frozen=True)
@@ -58,19 +63,43 @@ def _loop(name: str, step: float) -> Callable[[], Array]:
     return whole_loop(build_plant(FixedElements().scene(case, Setting(elements=ELEMENTS, time_step=step))))
 
 
-def _median(call: Callable[[], Array]) -> tuple[float, str]:
-    """Return the median time of a call [s], and the spread in words."""
+def _computing(call: Callable[[], Any]) -> tuple[float, str]:
+    """Return the median computing time of a call on this thread [s], and the spread in words; called once before."""
     call()
-    times = [seconds(call) for _ in range(LOOP_ROUNDS)]
+    times = []
+    for _ in range(ROUNDS):
+        started = clock.thread_time()
+        call()
+        times.append(clock.thread_time() - started)
     return median(times), f"{1e3 * median(times):.4g} ms ({1e3 * min(times):.4g} to {1e3 * max(times):.4g})"
 
 
 @cache
-def time_per_step(name: str) -> Measured:
-    """Return the median time of a step of 0.5 ms of a case on 40 elements, energies, works and reactions included [us]."""
-    steps = Setting(time_step=STEP).steps(_case(name)) or 1
-    time, shown = _median(_loop(name, STEP))
-    return Measured(MICROSECONDS * time / steps, f"{steps} steps in {shown}")
+def naive_step() -> Measured:
+    """Return the computing time [s] of a step of the naive program: 40 cubic elements assembled, factored and solved, on M."""
+    case = _case("M")
+    time, shown = _computing(NaiveElements().prepare(case, NAIVE))
+    return Measured(time / (NAIVE.steps(case) or 1), shown)
+
+
+def whole_answer(scene: str, changes: dict[str, Any]) -> Measured:
+    """Return the computing time of all that `run_scene` does with a shipped scene, in steps of the naive program."""
+    time, shown = _computing(whole_run(load_scene(scene).with_values(changes)))
+    return Measured(time / naive_step().value, f"{shown}; a naive step {1e3 * naive_step().value:.3g} ms")
+
+
+def time_per_step(scene: str, changes: dict[str, Any]) -> Measured:
+    """Return the computing time of a step of a run whose settings are given, ledger and samples included [us]."""
+    plant = build_plant(load_scene(scene).with_values(changes))
+    counted: list[int] = []
+
+    def run() -> Array:
+        found = simulate(plant)
+        counted.append(int(found.summary["steps"]))
+        return found.tip_deflection
+
+    time, shown = _computing(lambda: quietly(run))
+    return Measured(MICROSECONDS * time / counted[-1], f"{counted[-1]} steps in {shown}")
 
 
 @cache
@@ -159,13 +188,6 @@ def stability_of_two_modes() -> Measured:
     return Measured(found[worst], f"largest at {1e3 * worst:g} ms")
 
 
-def time_per_step_of_two_modes() -> Measured:
-    """Return the median time of a step of 1 ms of two modes on M2 [us]."""
-    steps = Setting(time_step=1e-3).steps(_case("M2")) or 1
-    time, shown = _median(_two_modes(1e-3))
-    return Measured(MICROSECONDS * time / steps, f"{steps} steps in {shown}")
-
-
 def time_of_command(*arguments: str) -> Measured:
     """Return the median time of the process `fem-needle ...` [s], caches warm.
 
@@ -185,20 +207,15 @@ def time_of_command(*arguments: str) -> Measured:
     return Measured(median(times[1:]), f"{min(times[1:]):.2f} to {max(times[1:]):.2f} s")
 
 
-def batch_efficiency() -> Measured:
-    """Return the efficiency of a batch on two cores: time on one / twice the time on two [%].
-
-    The batch is `brachytherapy` with inertia, 6 elements and steps of 6 ms, and 200 foundation moduli.
-    """
+def runs_per_second(threads: int) -> Measured:
+    """Return how many runs of 1600 steps a second and thread compute: `brachytherapy` with inertia, 6 elements, many moduli."""
     settings = {"numerics.elements": 6, "numerics.time_step": 6e-3, "numerics.analysis": "dynamic"}
-    scene = load_scene("brachytherapy").with_values(settings)
-    moduli = np.linspace(3e3, 5e3, BATCH)
+    scene, moduli = load_scene("brachytherapy").with_values(settings), np.linspace(3e3, 5e3, BATCH)
 
-    def run(count: int, threads: int) -> float:
+    def run(count: int) -> float:
         return seconds(lambda: simulate_many(scene, {MODULUS: moduli[:count]}, threads=threads))
 
-    for threads in (1, 2):
-        run(FEW, threads)
+    run(FEW)
     others = f"; others kept the cores busy, load {load():.1f}" if load() > BUSY else ""
-    one, two = run(BATCH, 1), run(BATCH, 2)
-    return Measured(100.0 * one / (2 * two), f"{BATCH} runs: {one:.3g} s on one core, {two:.3g} s on two{others}")
+    time = run(BATCH)
+    return Measured(BATCH / time, f"{BATCH} runs in {time:.3g} s on {threads} thread{'s' * (threads > 1)}{others}")

@@ -24,7 +24,7 @@ def test_the_steps_of_a_push_are_controlled(tolerance):
 
 def test_a_force_that_ramps_up_does_not_make_a_long_run_slow():
     """Against given steps of another method, which follow the vibrations, on twice as many elements."""
-    scene = load_scene(FOLDER / "three-layers.toml")
+    scene = load_scene("three-layers")
     run, fine = run_scene(scene), run_scene(scene, elements=12, analysis="dynamic", time_step=1e-3)
     true = np.interp(run.time, fine.time, fine.tip_deflection)
     error = np.max(np.abs(run.tip_deflection - true)) / np.max(np.abs(true))

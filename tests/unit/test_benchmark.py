@@ -9,9 +9,10 @@ from time import sleep
 import numpy as np
 import pytest
 
+from fem_needle.benchmark import goal_measurements
 from fem_needle.benchmark.cases import CASES, cases_of
 from fem_needle.benchmark.goal_measurements import Measured
-from fem_needle.benchmark.goals import TIMES_TO_ERROR, Goal, all_goals, fastest_to
+from fem_needle.benchmark.goals import Goal, all_goals
 from fem_needle.benchmark.growing_beam import spectral_tips
 from fem_needle.benchmark.library_elements import FactoredElements, NaiveElements
 from fem_needle.benchmark.methods import OWN, Method, Setting
@@ -188,11 +189,17 @@ def row(error, median, **values):
     return Row(**{"case": "S", "method": "m", "kind": OWN, "setting": Setting(), "error": error, "median": median} | values)
 
 
-def test_the_fastest_setting_that_is_good_enough_counts():
-    rows = [row(1e-2, 1e-6), row(1e-4, 3e-6), row(1e-5, 2e-6), row(0.0, 1e-7, kind="exact"), row(1e-9, 1e-9, case="D")]
-    assert fastest_to(TIMES_TO_ERROR[0], rows).value == pytest.approx(2.0)
-    with pytest.raises(NeedleError, match="no setting of S reached 1e-06"):
-        fastest_to(replace(TIMES_TO_ERROR[0], error=1e-6), rows[:3])
+def test_answers_and_steps_are_measured_in_their_units(monkeypatch):
+    monkeypatch.setattr(goal_measurements, "ROUNDS", 1)
+    monkeypatch.setattr(goal_measurements, "NAIVE", Setting(elements=4, time_step=0.8))
+    answer = goal_measurements.whole_answer("bench-s", {})
+    milliseconds = float(answer.note.split(" ms")[0])
+    assert answer.value == pytest.approx(1e-3 * milliseconds / goal_measurements.naive_step().value, rel=1e-2)
+    changes = {"numerics.analysis": "dynamic", "numerics.time_step": 1e-2, "numerics.elements": 2}
+    step = goal_measurements.time_per_step("bench-m", changes)
+    steps, rest = step.note.split(" steps in ")
+    assert int(steps) == 320
+    assert step.value == pytest.approx(1e3 * float(rest.split(" ms")[0]) / 320, rel=1e-2)
 
 
 def test_a_goal_is_met_missed_or_not_measured():
