@@ -73,7 +73,7 @@ def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
     if step > duration:
         raise SceneError(f"numerics.output_step: longer than the run (got {step:g}; allowed up to {duration:g} s)")
     analysis, skipped, leaves_out = numerics.analysis, tuple(unneeded_terms(scene)), False
-    effect = Inertia(1.0, 1.0)
+    effect = Inertia(1.0, 1.0, 0.0)
     if analysis == "auto" and scene.insertion.kind == "force":
         analysis = "dynamic"
     elif analysis == "dynamic" and _chooses_steps(scene):
@@ -92,11 +92,13 @@ def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
         skipped = (Skipped("inertia", f"analysis = '{analysis}' was asked for"), *skipped)
     if analysis == "dynamic" and numerics.time_step == "auto" and needs_no_steps(scene):
         skipped = (*skipped, Skipped("time steps", "held, undamped, under constant loads: eigenvectors once, then cosines"))
-    passes_over = analysis == "dynamic" and _may_pass_over(scene) and effect.lasting <= VIBRATION_SHARE * numerics.tolerance
+    is_unresolved = analysis == "dynamic" and effect.lasting <= VIBRATION_SHARE * numerics.tolerance
+    passes_over = is_unresolved and _may_pass_over(scene)
     if passes_over:
         reason = f"the tissue damps them; what lasts moves the tip by at most {effect.lasting:.1e} of its largest deflection"
         skipped = (Skipped("steps that follow vibrations", reason), *skipped)
-    left_out = effect.bound if leaves_out else effect.lasting if passes_over else 0.0
+    unresolved = effect.lasting if passes_over else effect.ringing if is_unresolved else 0.0
+    left_out = effect.bound if leaves_out else unresolved
     return Choice(analysis, step, skipped, left_out, min(effect.lasting, 1.0), passes_over)
 
 

@@ -58,11 +58,14 @@ class Inertia:
     bound
         How far it moves the tip at most.
     lasting
-        The same without vibrations that the tissue damps within a swing or two.
+        The same without vibrations that the tissue damps within a few swings.
+    ringing
+        How far vibrations that last move it, by themselves.
     """
 
     bound: float
     lasting: float
+    ringing: float
 
 
 def inertia_effect(plant: Plant, enough: float = 0.0) -> float:
@@ -86,7 +89,7 @@ def inertia_of(plant: Plant, enough: float = 0.0) -> Inertia:
     """
     scene = plant.scene
     if scene.initial.shape != "equilibrium":
-        return Inertia(inf, inf)
+        return Inertia(inf, inf, inf)
     kinks = _kinks(plant)
     grid, is_short = _grid(plant, kinks)
     slow = _tips(plant, grid, without_inertia(scene))
@@ -94,10 +97,11 @@ def inertia_of(plant: Plant, enough: float = 0.0) -> Inertia:
     if without_inertia(scene).kind == REST:
         bound = _slow_bound(plant, kinks, np.array(grid.outputs), slow) / largest
         if bound <= enough:
-            return Inertia(bound, bound)
+            return Inertia(bound, bound, bound)
     fast = _tips(plant, grid, Integration(DYNAMIC, collocation(0.0)))
-    lasting, passing = _bounds(scene, kinks, np.array(grid.outputs), is_short, np.abs(fast - slow))
-    return Inertia((lasting + passing) / largest, lasting / largest)
+    forced, staying, passing = _bounds(scene, kinks, np.array(grid.outputs), is_short, np.abs(fast - slow))
+    lasting = SUDDEN * forced + staying
+    return Inertia((lasting + passing) / largest, lasting / largest, staying / largest)
 
 
 def _slow_bound(plant: Plant, kinks: Sequence[_Kink], time: Array, tips: Array) -> float:
@@ -114,8 +118,8 @@ def _slow_bound(plant: Plant, kinks: Sequence[_Kink], time: Array, tips: Array) 
 
 def _bounds(
     scene: Scene, kinks: Sequence[_Kink], time: Array, is_short: NDArray[np.bool_], difference: Array
-) -> tuple[float, float]:
-    """Return bounds [m] of what lasts and of what passes, from what inertia moves the tip by at times [s]."""
+) -> tuple[float, float, float]:
+    """Return bounds [m] of what loads do, of vibrations that stay and of those that pass, from what inertia does at times [s]."""
     forced, staying, passing = 0.0, 0.0, 0.0
     for number, (kink, following) in enumerate(pairwise(kinks)):
         inside = (time >= kink.time) & (time <= following.time)
@@ -129,7 +133,7 @@ def _bounds(
             passing = max(passing, swing)
         else:
             staying += swing * _growth(kink, kinks[number + 1 :], is_growing=scene.support.kind == "entry")
-    return SUDDEN * forced + staying, passing
+    return forced, staying, passing
 
 
 def _growth(kink: _Kink, later: Sequence[_Kink], *, is_growing: bool) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time as clock
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
@@ -22,6 +23,8 @@ from fem_needle.trajectory import VARIABLES
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
+
+SHORT = 0.1  # s: of shorter runs most is spent on choosing mesh and steps, in Python
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,7 +120,8 @@ def simulate_many(
     Notes
     -----
     Where a scene gives its mesh and its time step, nothing but that run is computed; otherwise they are chosen as `run_scene`
-    does, which takes trial runs. Threads share one interpreter: they help as far as runs spend their time in compiled steps.
+    does, which takes trial runs. Threads share one interpreter: they help as far as runs spend their time in compiled steps. Of
+    short runs whose settings are chosen, one thread is used.
     """
     for name, value in (("cores", cores), ("vibrations", vibrations)):
         if value is not None:
@@ -168,7 +172,7 @@ class _One:
 def _gathered(scenes: list[Scene], names: tuple[str, ...], threads: int, progress: Progress) -> ManyRuns:
     """Run every scene in a thread, and gather what they gave; compiled code is there before threads start."""
     warming.prepare()
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(threads if _threads_pay(scenes[0]) else 1) as pool:
         waiting = [pool.submit(_one, scene, names) for scene in scenes]
         try:
             for done, finished in enumerate(as_completed(waiting), start=1):
@@ -184,6 +188,18 @@ def _gathered(scenes: list[Scene], names: tuple[str, ...], threads: int, progres
             pool.shutdown(cancel_futures=True)
             raise
         return _table([run.result() for run in waiting], names)
+
+
+def _threads_pay(scene: Scene) -> bool:
+    """Return whether a scene's run is long, or spends its time in compiled code: Python's own threads wait for each other."""
+    if _is_given(scene):
+        return True
+    started = clock.perf_counter()
+    try:
+        run_scene(scene)
+    except ComputationError:  # which will be told as that of a run with its number
+        return True
+    return clock.perf_counter() - started > SHORT
 
 
 def _finished(run: Future[_One]) -> _One | None:
