@@ -109,14 +109,16 @@ def setting_of(scene: Scene, over: str, values: Sequence[float] | None) -> Setti
     if over != "time-step" and values:
         scene = scene.with_values(overriding({PATHS[over]: max(values)}))
     choice = choose(scene, lambda: family.pilot(scene))
-    scene = scene.with_value("numerics.analysis", choice.analysis)
+    scene, followed = scene.with_value("numerics.analysis", choice.analysis), choice.analysis
+    if choice.passes_over:
+        scene, followed = scene.with_value("numerics.spectral_radius", 0.0), "quasi-static"
     plant = family.pilot(scene)
     if _is_series_of_equilibria(scene, plant):
         if over == "time-step":
             raise SceneError("over: got 'time-step', but this run is a series of equilibria (allowed 'elements', 'modes')")
         return Setting(scene, over, _instants(scene), None, choice.output_step)
     given = scene.numerics.time_step
-    step = given if isinstance(given, float) else FIXED_STEP_SHARE * first_time_step(plant, choice.analysis, choice.output_step)
+    step = given if isinstance(given, float) else FIXED_STEP_SHARE * first_time_step(plant, followed, choice.output_step)
     return Setting(scene, over, None, None if over == "time-step" else step, choice.output_step)
 
 
