@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from fem_needle import banded
 from fem_needle.free_response import frozen_matrices, vibrations
 from fem_needle.initial import initial_state
-from fem_needle.ledger import StepEnd, configuration_force, form
+from fem_needle.ledger import StepEnd
 from fem_needle.loads import is_steady, turns_with_needle
 from fem_needle.motion import depth_law
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene
-from fem_needle.stages import StageSolution
 from fem_needle.statics import static_state
 
 Array = NDArray[np.float64]
@@ -145,9 +144,7 @@ def vibration_samples(vibration: Vibration, times: Array) -> Samples:
         bending = operators.beam.bending_forms(coordinates.T)
     kinks = float(start.forces @ points.flexibility @ start.forces)
     needed = _products(operators.mass, accelerations) + bent + held - points.rows.T @ start.forces
-    axial_forces = np.array(
-        [_axial_force(vibration, *state) for state in zip(coordinates, velocities, accelerations, strict=True)]
-    )
+    axial_forces = _axial_forces(vibration, coordinates, velocities, accelerations)
     hub = _clamp(plant, needed, stage.instant.depth)
     moved = (coordinates - start.coordinates) @ points.rows.T
     none = np.zeros(count)
@@ -194,14 +191,18 @@ def _clamp(plant: Plant, needed: Array, depth: float) -> Array:
     return needed[:, :2] @ answers
 
 
-def _axial_force(vibration: Vibration, coordinates: Array, velocities: Array, accelerations: Array) -> float:
-    """Return A = dL/dz - d/dt (q'.S q) of a held needle [N]."""
-    plant, stage = vibration.plant, vibration.origin.stage
+def _axial_forces(vibration: Vibration, coordinates: Array, velocities: Array, accelerations: Array) -> Array:
+    """Return A = dL/dz - d/dt (q'.S q) of a held needle at every time [N] (T,)."""
+    plant, stage, forces = vibration.plant, vibration.origin.stage, vibration.origin.solution.forces
     if not plant.axial_force_acts:
-        return 0.0
-    solution = StageSolution(coordinates, velocities, velocities, vibration.origin.solution.forces)
-    force = configuration_force(plant, stage, solution)
+        return np.zeros(len(coordinates))
+    depth, time, points = stage.instant.depth, stage.instant.time, stage.points
+    stiffer = np.array([plant.stiffness_rate_product(unit, depth, time) for unit in np.eye(plant.size)])
+    found = -0.5 * np.sum(coordinates * (coordinates @ stiffer), axis=1)
+    found += [plant.kinetic_rate(rate, at, depth, 0.0) for rate, at in zip(velocities, coordinates, strict=True)]
+    found += coordinates @ (points.row_rates.T @ forces) + 0.5 * forces @ points.flexibility_rate @ forces
     convection = stage.operators.convection
     if convection is not None:
-        force -= form(convection, accelerations, coordinates) + form(convection, velocities, velocities)
-    return force
+        swept = _products(convection, coordinates)
+        found -= np.sum(accelerations * swept, axis=1) + np.sum(velocities * _products(convection, velocities), axis=1)
+    return np.asarray(found)
