@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from fem_needle import Simulation
+from fem_needle.dynamics.model import is_known
 from fem_needle.scene import Guide, Insertion, Layer, Sinusoid, Table, TipLoad
+from reduced_model import AssumedModeNeedle
 from tests.consistency.closed_loop_scenes import MODELS, loop_scene
 from tests.consistency.scenes import DAMPED, held, moving
 
@@ -113,6 +115,21 @@ def test_copies_go_on_with_the_same_bits(name, model):
     assert_same(went_on(pickle.loads(stored), commands[3:]), expected)
     other.restore(state)
     assert_same(went_on(other, commands[3:]), expected)
+
+
+@pytest.mark.parametrize("name", ["speeds, entry", "push, creep, entry", "cut path"])
+def test_copies_of_needles_whose_matrices_are_asked_for(name):
+    scene, analysis, commands = CASES[name]
+    plant = AssumedModeNeedle(scene, modes=5)
+    assert not is_known(plant)
+    simulation = Simulation(plant, time_step=3e-4, analysis=analysis, output_step=1.3e-3)
+    went_on(simulation, commands[:3])
+    copied, stored, state = simulation.copy(), pickle.dumps(simulation), simulation.state
+    expected = went_on(simulation, commands[3:])
+    assert_same(went_on(copied, commands[3:]), expected)
+    assert_same(went_on(pickle.loads(stored), commands[3:]), expected)
+    simulation.restore(state)
+    assert_same(went_on(simulation, commands[3:]), expected)
 
 
 @pytest.mark.parametrize("name", CASES)
