@@ -13,7 +13,7 @@ from fem_needle.motion import DepthLaw
 from fem_needle.path import straight_path
 from fem_needle.plant import Plant
 from fem_needle.stages import Stage, StageSolution, evaluate_stage, momentum, trivial_solution, with_path
-from fem_needle.statics import depth_derivative, solve_static, static_state
+from fem_needle.statics import derivative_of, equilibrium_of, static_state
 
 Array = NDArray[np.float64]
 
@@ -50,10 +50,11 @@ def _initial_solution(plant: Plant, law: DepthLaw, stage: Stage) -> StageSolutio
 
 
 def _moving_equilibrium(plant: Plant, law: DepthLaw, stage: Stage) -> StageSolution:
-    rest = solve_static(plant, depth=law.depth(0.0), time=0.0)
+    there = stage.operators, stage.points
+    rest = equilibrium_of(plant, *there, stage.case, depth=law.depth(0.0), time=0.0)
     velocities = np.zeros(plant.size)
     if stage.instant.speed:
-        velocities = stage.instant.speed * depth_derivative(plant, rest)[0]
+        velocities = stage.instant.speed * derivative_of(plant, rest, *there)[0]
     start = momentum(stage, rest.coordinates, velocities)
     return StageSolution(rest.coordinates, velocities, start, rest.point_forces)
 

@@ -93,7 +93,13 @@ def solve_static(plant: Plant, *, depth: float, time: float = 0.0) -> Equilibriu
     case = load_case(plant.scene, depth, time)
     if depth < plant.smallest_depth:
         return _straight(plant, depth, time, case)
-    operators, points = plant.operators(depth, time), plant.points(depth)
+    return equilibrium_of(plant, plant.operators(depth, time), plant.points(depth), case, depth=depth, time=time)
+
+
+def equilibrium_of(
+    plant: Plant, operators: Operators, points: Points, case: LoadCase, *, depth: float, time: float
+) -> Equilibrium:
+    """Return the equilibrium of matrices that are there already; errors as in `solve_static`."""
     state = _supported_state(plant, operators, points, case, depth=depth, time=time)
     rounding = 0.0
     if operators.beam is None:
@@ -164,7 +170,7 @@ def _equilibrium(
 ) -> Equilibrium:
     """Collect a static state and the reactions that follow from it."""
     hub_force, hub_moment = plant.clamp_reactions(support, depth)
-    guides = plant.points(depth).guides
+    guides = len(plant.scene.support.guides)
     tissue = -plant.deflection_at_one @ banded.multiply(operators.tissue, coordinates)
     return Equilibrium(
         plant,
@@ -208,7 +214,11 @@ def depth_derivative(plant: Plant, rest: Equilibrium) -> tuple[Array, Array]:
     """
     if rest.depth < plant.smallest_depth:
         return np.zeros(plant.size), np.zeros(0)
-    operators, points = plant.operators(rest.depth, rest.time), plant.points(rest.depth)
+    return derivative_of(plant, rest, plant.operators(rest.depth, rest.time), plant.points(rest.depth))
+
+
+def derivative_of(plant: Plant, rest: Equilibrium, operators: Operators, points: Points) -> tuple[Array, Array]:
+    """Return what `depth_derivative` does, of matrices that are there already."""
     moved = plant.stiffness_rate_product(rest.coordinates, rest.depth, rest.time)
     force = points.row_rates.T @ rest.point_forces - moved
     guides = points.guides

@@ -46,6 +46,13 @@ class TimeGrid:
 
     def intervals(self) -> Iterator[tuple[float, float, int]]:
         """Yield (start, end, steps) between successive outputs and landings."""
+        return iter(self._intervals)
+
+    @cached_property
+    def _intervals(self) -> tuple[tuple[float, float, int], ...]:
+        return tuple(self._found())
+
+    def _found(self) -> Iterator[tuple[float, float, int]]:
         marks, kinks = sorted({*self.outputs, *self.landings}), {0.0, *self.landings}
         for start, end in pairwise(marks):
             count = max(1, ceil((end - start) / self._longest(0.5 * (start + end)) - 1e-9))
