@@ -143,12 +143,12 @@ class Push:
             if status == at.DONE:
                 continue
             until = self._interrupted_end(intervals)
-            found.append(self._meet(status, until, direction, level, from_start))
-            from_start = False
+            met = self._meet(status, until, direction, level, from_start)
             reason = self._end_reason()
             if reason is not None:
-                return reason, found
-            found.pop()
+                return reason, [*found, met]
+            found.append(met.rows(slice(0, int(from_start))))  # what happens under way is no output, the start is
+            from_start = False
         return self._end_reason(), found
 
     def _intervals(self, end: float, length: float, output: bool) -> Array:

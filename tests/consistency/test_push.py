@@ -304,3 +304,15 @@ def test_the_time_to_the_speed_limit_is_that_of_the_rod():
     run = run_of(scene, 1e-4)
     assert run.speed[-1] == pytest.approx(0.5 / VISCOUS, rel=1e-9)
     assert exp(-run.time[-1] / TIME) == pytest.approx(0.5)
+
+
+def test_the_start_is_shown_where_the_needle_stops_before_the_first_output():
+    """A push that begins above friction and sinks below it at once."""
+    sinking = Table(time=[0.0, 1e-3, 1.0], value=[0.5, 0.0, 0.0])
+    insertion = Insertion(kind="force", initial_depth=0.05, push_force=sinking)
+    scene = scene_of("entry", insertion, (), friction=Friction(coulomb=0.3), duration=0.04)
+    run = simulate(FiniteElementNeedle(scene, elements=2), time_step=1e-3, output_step=0.02)
+    assert run.time.tolist() == pytest.approx([0.0, 0.02, 0.04])
+    assert run.depth[0] == 0.05 < run.depth[1] == run.depth[2]
+    assert run.push_force[0] == pytest.approx(0.5)
+    assert abs(run.axial_energy_residual[-1]) < 1e-6 * run.push_work[-1]
