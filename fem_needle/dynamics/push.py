@@ -216,6 +216,8 @@ class Push:
         if kind != "reaches":
             self._axial[at.PACE] = 0.0
             return
+        if self.speed < 0.0 and level <= self.needle.plant.smallest_depth:  # what is left of it inside is straight: it is out
+            level = 0.0
         # Exactly there: a rounding beyond would count as cut, or as pierced.
         deepest = float(self._before_deepest)
         self._axial[at.WAY], self._axial[at.DEEPEST] = level, max(deepest, level)
@@ -245,6 +247,10 @@ class Push:
         }
         changes["depth"][last], changes["speed"][last] = self.depth, speed
         changes["arrest_loss"][last] = self.needle.live.ledger[at.ARREST_LOSS]
+        if self.depth == 0.0 and speed < 0.0 and self.needle.plant.smallest_depth:  # what was inside is out, and straight
+            for name in ("kinetic_energy", "bending_energy", "tissue_energy", "coordinates"):
+                changes[name] = np.array(getattr(samples, name))
+                changes[name][last] = 0.0
         if speed == 0.0:
             changes["friction_force"][last], changes["axial_kinetic_energy"][last] = force, 0.0
         return replace(samples, **changes)

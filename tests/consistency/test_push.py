@@ -316,3 +316,13 @@ def test_the_start_is_shown_where_the_needle_stops_before_the_first_output():
     assert run.depth[0] == 0.05 < run.depth[1] == run.depth[2]
     assert run.push_force[0] == pytest.approx(0.5)
     assert abs(run.axial_energy_residual[-1]) < 1e-6 * run.push_work[-1]
+
+
+def test_a_bent_needle_that_is_pulled_out_is_straight():
+    """Under `entry` the inserted part gets ever shorter, and what swings in it ever faster: that ends where it is out."""
+    loads, friction = [TipLoad(force=0.1)], Friction(coulomb=0.2, viscous=2.0)
+    scene = scene_of("entry", pushed(-1.0, 0.04), GEL, loads, friction=friction, duration=0.5)
+    run = run_of(scene, 1e-3, output_step=0.01, elements=4)
+    assert (run.summary["stop_reason"], run.depth[-1]) == ("withdrawn", 0.0)
+    assert run.tip_deflection[-1] == run.bending_energy[-1] == run.kinetic_energy[-1] == 0.0
+    assert axial_residual(run) < 1e-6
