@@ -321,8 +321,10 @@ def test_the_start_is_shown_where_the_needle_stops_before_the_first_output():
 def test_a_bent_needle_that_is_pulled_out_is_straight():
     """Under `entry` the inserted part gets ever shorter, and what swings in it ever faster: that ends where it is out."""
     loads, friction = [TipLoad(force=0.1)], Friction(coulomb=0.2, viscous=2.0)
-    scene = scene_of("entry", pushed(-1.0, 0.04), GEL, loads, friction=friction, duration=0.5)
-    run = run_of(scene, 1e-3, output_step=0.01, elements=4)
+    layers = (Layer(foundation_modulus=5e3, damping=100.0),)
+    scene = scene_of("entry", pushed(-1.0, 0.04), layers, loads, friction=friction, duration=0.5)
+    run = run_of(scene, 1e-4, output_step=0.01, elements=4)
     assert (run.summary["stop_reason"], run.depth[-1]) == ("withdrawn", 0.0)
+    assert np.max(np.abs(run.energy_residual)) < 1e-4 * np.max(run.bending_energy)
     assert run.tip_deflection[-1] == run.bending_energy[-1] == run.kinetic_energy[-1] == 0.0
-    assert axial_residual(run) < 1e-6
+    assert axial_residual(run) < 1e-5
