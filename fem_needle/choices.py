@@ -14,7 +14,7 @@ from fem_needle.dynamics.rests import tips_at_rest
 from fem_needle.dynamics.vibration import needs_no_steps, vibrating_tips
 from fem_needle.errors import SceneError
 from fem_needle.free_response import natural_frequencies
-from fem_needle.inertia_effect import POINTS_PER_PERIOD, Inertia, inertia_of
+from fem_needle.inertia_effect import POINTS_PER_PERIOD, SHALLOW, Inertia, inertia_of
 from fem_needle.limits import check_samples
 from fem_needle.loads import load_cases
 from fem_needle.motion import PUSH_SLACK, depth_law, lateral_values, run_duration, shortest_period
@@ -32,7 +32,6 @@ HISTORY_POINTS = (400, 2000)  # fewest and most instants at which vibrations of 
 OUTPUTS = 200
 STEPS_PER_PERIOD = 16
 VIBRATION_SHARE = 0.5  # of the tolerance: smaller vibrations need not be resolved
-SHALLOW = 0.02  # of the length: shallower `entry` needles are too stiff to matter
 
 
 @dataclass(frozen=True)
@@ -129,14 +128,16 @@ def tip_difference(scene: Scene, plant: Plant, finer: Plant, analysis: str = "st
     output = scene.numerics.output_step
     outputs = run_duration(scene) / output if isinstance(output, float) else OUTPUTS
     times = np.linspace(0.0, run_duration(scene), round(min(max(outputs, HISTORY_POINTS[0]), HISTORY_POINTS[1])) + 1)
-    coarse, fine = vibrating_tips(plant, times), vibrating_tips(finer, times)
-    scale = max(float(np.max(np.abs(fine))), scene.numerics.absolute_tolerance)
-    return float(np.max(np.abs(coarse - fine))) / scale
+    return float(np.max(relative_differences(scene, vibrating_tips(plant, times), vibrating_tips(finer, times))))
 
 
 def tip_differences(scene: Scene, plant: Plant, finer: Plant, count: int = PILOT_INSTANTS) -> Array:
     """Return the differences at each of the `instants`."""
-    coarse, fine = static_tips(plant, count), static_tips(finer, count)
+    return relative_differences(scene, static_tips(plant, count), static_tips(finer, count))
+
+
+def relative_differences(scene: Scene, coarse: Array, fine: Array) -> Array:
+    """Return the differences of tips, relative to the largest of the finer ones."""
     scale = max(float(np.max(np.abs(fine))), scene.numerics.absolute_tolerance)
     return np.abs(coarse - fine) / scale
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.choices import instants, static_tips, tip_difference
+from fem_needle.choices import instants, relative_differences, static_tips, tip_difference
 from fem_needle.dynamics.vibration import needs_no_steps
 from fem_needle.errors import SceneError
 from fem_needle.models import ChosenPlant
@@ -98,9 +98,8 @@ class Meshes:
         """
         if self._needs_no_steps:
             return VIBRATING * tip_difference(self.scene, plant, finer, self.analysis)
-        coarse, fine = self._tips_at_rest(plant), self._tips_at_rest(finer)
-        scale = max(float(np.max(np.abs(fine))), self.scene.numerics.absolute_tolerance)
-        return BETWEEN * float(np.max(np.abs(coarse - fine))) / scale
+        tips = self._tips_at_rest(plant), self._tips_at_rest(finer)
+        return BETWEEN * float(np.max(relative_differences(self.scene, *tips)))
 
     def _tips_at_rest(self, plant: Plant) -> Array:
         if plant not in self._tips:

@@ -24,7 +24,7 @@ from fem_needle.free_response import natural_frequencies
 from fem_needle.limits import check_swings
 from fem_needle.motion import depth_law, landing_times, lateral_values, run_duration, shortest_period
 from fem_needle.plant import Plant
-from fem_needle.sample_arrays import joined
+from fem_needle.sample_arrays import joined, tips_of
 from fem_needle.scene import Scene
 
 Array = NDArray[np.float64]
@@ -186,6 +186,4 @@ def _grid(plant: Plant, kinks: Sequence[_Kink]) -> tuple[TimeGrid, NDArray[np.bo
 
 def _tips(plant: Plant, grid: TimeGrid, integration: Integration) -> Array:
     """Return the tip deflections [m] at all steps."""
-    samples = joined(list(run_samples(plant, integration, grid)))
-    length = np.array([plant.scene.needle.length])
-    return plant.deflection(samples.coordinates, samples.point_forces, samples.depth, length)[:, 0]
+    return tips_of(plant, joined(list(run_samples(plant, integration, grid))))

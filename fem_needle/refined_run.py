@@ -24,7 +24,7 @@ from fem_needle.expectation import Expectation, expectation
 from fem_needle.limits import check_steps
 from fem_needle.motion import shortest_period
 from fem_needle.run_job import Job, begin, collect, integration, shown, total_error, trajectory_of
-from fem_needle.sample_arrays import Samples, joined
+from fem_needle.sample_arrays import Samples, joined, tips_of
 from fem_needle.trajectory import Trajectory, guide_advice
 
 Array = NDArray[np.float64]
@@ -78,9 +78,7 @@ class _Trial:
     @property
     def tips(self) -> Array:
         """Tip deflections [m] at the samples."""
-        plant, samples = self.job.plant, self.samples
-        tip = np.array([plant.scene.needle.length])
-        return plant.deflection(samples.coordinates, samples.point_forces, samples.depth, tip)[:, 0]
+        return tips_of(self.job.plant, self.samples)
 
 
 class _InterruptedError(Exception):

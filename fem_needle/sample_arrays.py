@@ -8,6 +8,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.plant import Plant
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Selection = slice | NDArray[np.bool_] | NDArray[np.integer]
@@ -103,6 +105,12 @@ class Samples:
 
 
 OVER_TIME = tuple(field.name for field in fields(Samples) if field.name not in {"path_position", "path_deflection"})
+
+
+def tips_of(plant: Plant, samples: Samples) -> Array:
+    """Return the tip deflections [m] of samples (T,)."""
+    tip = np.array([plant.scene.needle.length])
+    return plant.deflection(samples.coordinates, samples.point_forces, samples.depth, tip)[:, 0]
 
 
 def joined(blocks: Sequence[Samples]) -> Samples:

@@ -24,7 +24,7 @@ from fem_needle.trajectory import VARIABLES
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
-SHORT = 0.1  # s: of shorter runs most is spent on choosing mesh and steps, in Python
+SHORT = 0.1  # s: of shorter runs most is spent on choosing mesh and steps, in Python, whose threads wait for each other
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -160,6 +160,7 @@ def _varied(scene: Scene, parameters: Mapping[str, ArrayLike]) -> list[Scene]:
         raise SceneError("parameters: nothing to compute (got arrays of 0 values; allowed 1 or more)")
     return found or [scene]
 
+
 @dataclass(frozen=True, eq=False)
 class _One:
     """One run: rows of time, depth, tip deflection and what else was asked for (3 + variables, outputs)."""
@@ -172,8 +173,12 @@ class _One:
 def _gathered(scenes: list[Scene], names: tuple[str, ...], threads: int, progress: Progress) -> ManyRuns:
     """Run every scene in a thread, and gather what they gave; compiled code is there before threads start."""
     warming.prepare()
-    with ThreadPoolExecutor(threads if _threads_pay(scenes[0]) else 1) as pool:
-        waiting = [pool.submit(_one, scene, names) for scene in scenes]
+    started = clock.perf_counter()
+    with ThreadPoolExecutor(1) as alone:
+        first = alone.submit(_one, scenes[0], names)
+    pays = _is_given(scenes[0]) or clock.perf_counter() - started > SHORT
+    with ThreadPoolExecutor(threads if pays else 1) as pool:
+        waiting = [first, *(pool.submit(_one, scene, names) for scene in scenes[1:])]
         try:
             for done, finished in enumerate(as_completed(waiting), start=1):
                 finished.result()
@@ -188,18 +193,6 @@ def _gathered(scenes: list[Scene], names: tuple[str, ...], threads: int, progres
             pool.shutdown(cancel_futures=True)
             raise
         return _table([run.result() for run in waiting], names)
-
-
-def _threads_pay(scene: Scene) -> bool:
-    """Return whether a scene's run is long, or spends its time in compiled code: Python's own threads wait for each other."""
-    if _is_given(scene):
-        return True
-    started = clock.perf_counter()
-    try:
-        run_scene(scene)
-    except ComputationError:  # which will be told as that of a run with its number
-        return True
-    return clock.perf_counter() - started > SHORT
 
 
 def _finished(run: Future[_One]) -> _One | None:

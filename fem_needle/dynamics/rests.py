@@ -12,6 +12,7 @@ from fem_needle.dynamics.drive import drive_of
 from fem_needle.dynamics.engine import REST, Engine
 from fem_needle.dynamics.model import is_known
 from fem_needle.plant import Plant
+from fem_needle.sample_arrays import tips_of
 from fem_needle.statics import solve_static
 
 Array = NDArray[np.float64]
@@ -30,16 +31,19 @@ def tips_at_rest(plant: Plant, places: Sequence[tuple[float, float]]) -> Array:
     times = np.array([time for time, _ in places])
     before = BEFORE * max(1.0, float(times[-1]))
     if not is_known(plant) or np.any(np.diff(times) <= 4.0 * before):
-        return np.array([solve_static(plant, depth=depth, time=time).tip_deflection for time, depth in places])
+        return _one_by_one(plant, places)
     engine = Engine(plant, REST)
     engine.drive(drive_of(plant.scene).replaced({at.DEPTH_SIGNAL: _resting_rows(places, before)}))
     engine.land()
     ones = np.ones(len(times))
     _, samples = engine.advance(np.stack([times - before, times, ones, ones], axis=1), counted=False)
     if len(samples) < len(times) or not np.all(np.isfinite(samples.coordinates)):  # which says why
-        return np.array([solve_static(plant, depth=depth, time=time).tip_deflection for time, depth in places])
-    tip = np.array([plant.scene.needle.length])
-    return plant.deflection(samples.coordinates, samples.point_forces, samples.depth, tip)[:, 0]
+        return _one_by_one(plant, places)
+    return tips_of(plant, samples)
+
+
+def _one_by_one(plant: Plant, places: Sequence[tuple[float, float]]) -> Array:
+    return np.array([solve_static(plant, depth=depth, time=time).tip_deflection for time, depth in places])
 
 
 def _resting_rows(places: Sequence[tuple[float, float]], before: float) -> Array:

@@ -19,7 +19,6 @@ RANKS = {
     "path": 0,
     "piecewise": 0,
     "row_blocks": 0,
-    "sample_arrays": 0,
     "shipped": 0,
     "atomic_file": 0,
     "folder_lock": 0,
@@ -42,6 +41,7 @@ RANKS = {
     "tissue_block": 2,
     "layer_names": 2,
     "plant": 2,
+    "sample_arrays": 3,
     "models": 3,
     # parts of a model, and what needs only the protocol
     "axial": 3,
