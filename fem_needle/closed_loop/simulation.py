@@ -126,7 +126,7 @@ class Simulation:
         """Have new sensors beside the needle, and nothing recorded."""
         needle, scene = self._needle, self.scene
         self._rig = SensorRig(scene, seed, self._settings["repetition"])
-        self._commands: frozenset[str] = frozenset() if scene.controller.kind == "none" else frozenset({scene.controller.input})
+        self._commands: frozenset[str] = frozenset({scene.controller.input} if scene.controller.commands_input else ())
         self._record = LoopRecord(scene, needle.width)
         self.stop_reason: str | None = None
         self._account = Account(scene, needle.depth, needle.tip_deflection)

@@ -41,7 +41,7 @@ def controller_of(scene: Scene, model: Plant | None = None) -> Controller[Any]:
         If the model has no equilibrium on the way.
     """
     controller = scene.controller
-    if controller.kind == "none" or controller.variant == "fully-actuated":
+    if not controller.commands_input:
         return Uncontrolled()
     if controller.variant == "as-printed":
         return _printed(scene)

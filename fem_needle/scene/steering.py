@@ -274,9 +274,14 @@ class Controller(Part):
         return self
 
     @property
+    def commands_input(self) -> bool:
+        """Whether it commands its input; fully actuated inverse dynamics acts on every coordinate instead."""
+        return self.kind != "none" and self.variant != "fully-actuated"
+
+    @property
     def feedback(self) -> frozenset[str]:
         """Names of the readings that make the error; none of a controller that reads nothing."""
-        if self.kind == "none" or self.variant == "fully-actuated":
+        if not self.commands_input:
             return frozenset()
         if self.variant == "as-printed":
             return frozenset({"needle_angle", "tissue_deformation"})

@@ -6,9 +6,11 @@ import pickle
 import numpy as np
 import pytest
 
-from fem_needle import Simulation
+from fem_needle import Simulation, load_scene
 from fem_needle.dynamics.model import is_known
+from fem_needle.models import build_plant
 from fem_needle.scene import Guide, Insertion, Layer, Sinusoid, Table, TipLoad
+from fem_needle.shipped import shipped_names
 from reduced_model import AssumedModeNeedle
 from tests.consistency.closed_loop_scenes import MODELS, loop_scene
 from tests.consistency.scenes import DAMPED, held, moving
@@ -115,6 +117,14 @@ def test_copies_go_on_with_the_same_bits(name, model):
     assert_same(went_on(pickle.loads(stored), commands[3:]), expected)
     other.restore(state)
     assert_same(went_on(other, commands[3:]), expected)
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_every_shipped_scene_can_be_stepped(name):
+    simulation = Simulation(build_plant(load_scene(name)))
+    simulation.step({}, 1e-3)
+    assert simulation.time == pytest.approx(1e-3)
+    assert np.isfinite(simulation.trajectory().tip_deflection).all()
 
 
 @pytest.mark.parametrize("name", ["speeds, entry", "push, creep, entry", "cut path"])
