@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import pi
+from math import inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_needle.dynamics.parts import COSINES, PASSED_OVER, Part
 from fem_needle.dynamics.push import run_limits
 from fem_needle.dynamics.rests import tips_at_rest
 from fem_needle.dynamics.vibration import needs_no_steps, vibrating_tips
@@ -19,6 +20,7 @@ from fem_needle.limits import check_samples
 from fem_needle.loads import load_cases
 from fem_needle.motion import PUSH_SLACK, depth_law, lateral_values, run_duration, shortest_period
 from fem_needle.plant import Plant
+from fem_needle.run_parts import VIBRATION_SHARE, chooses_steps, most_lasting, parts_with_inertia, without_inertia_throughout
 from fem_needle.scene import Scene, as_function
 from fem_needle.skipping import INERTIA_SHARE, Skipped, unneeded_terms
 
@@ -31,7 +33,6 @@ SLOW_PERIODS = 10  # longest natural periods: loads that swing faster are taken 
 HISTORY_POINTS = (400, 2000)  # fewest and most instants at which vibrations of two plants are compared: the outputs else
 OUTPUTS = 200
 STEPS_PER_PERIOD = 16
-VIBRATION_SHARE = 0.5  # of the tolerance: smaller vibrations need not be resolved
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,8 @@ class Choice:
     vibration
         How far inertia moves the tip at most, relative to its largest deflection, vibrations that the tissue damps at once left
         out; 1 where that was not looked at.
-    passes_over
-        Whether steps need not follow vibrations, because the tissue damps them: an L-stable method passes over them.
+    parts
+        How the needle gets through the parts of the run.
     """
 
     analysis: str
@@ -60,7 +61,12 @@ class Choice:
     skipped: tuple[Skipped, ...]
     inertia_error: float
     vibration: float = 1.0
-    passes_over: bool = False
+    parts: tuple[Part, ...] = ()
+
+    @property
+    def passes_over(self) -> bool:
+        """Whether steps follow vibrations nowhere, because the tissue damps them: an L-stable method passes over them."""
+        return bool(self.parts) and all(part.how == PASSED_OVER for part in self.parts)
 
 
 def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
@@ -71,51 +77,46 @@ def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
     check_samples(duration, step, stations=numerics.output_points)
     if step > duration:
         raise SceneError(f"numerics.output_step: longer than the run (got {step:g}; allowed up to {duration:g} s)")
-    analysis, skipped, leaves_out = numerics.analysis, tuple(unneeded_terms(scene)), False
-    effect = Inertia(1.0, 1.0, 0.0)
-    if analysis == "auto" and scene.insertion.kind == "force":
-        analysis = "dynamic"
-    elif analysis == "dynamic" and _chooses_steps(scene):
+    skipped = tuple(unneeded_terms(scene))
+    effect = _effect(scene, pilot)
+    allowed = INERTIA_SHARE * numerics.tolerance
+    bound = f"moves the tip by at most {effect.bound:.1e} of its largest deflection (allowed {allowed:.1e})"
+    if numerics.analysis != "dynamic" and (numerics.analysis != "auto" or effect.bound <= allowed):
+        is_free = numerics.analysis == "auto"
+        analysis, left_out = ("quasi-static", effect.bound) if is_free else (numerics.analysis, 0.0)
+        why = Skipped("inertia", bound if is_free else f"analysis = '{analysis}' was asked for")
+        parts: tuple[Part, ...] = (without_inertia_throughout(scene, analysis, why.reason),)
+        return Choice(analysis, step, (why, *skipped), left_out, min(effect.lasting, 1.0), parts)
+    parts = parts_with_inertia(scene, effect, step)
+    if parts[0].how == COSINES:
+        skipped = (*skipped, Skipped("time steps", parts[0].reason))
+    return Choice("dynamic", step, skipped, _unresolved(scene, effect, parts), min(effect.lasting, 1.0), parts)
+
+
+def _effect(scene: Scene, pilot: Callable[[], Plant]) -> Inertia:
+    """Return what inertia does, where that decides about something."""
+    numerics = scene.numerics
+    if scene.insertion.kind != "force" and numerics.analysis == "auto":
+        return inertia_of(pilot(), enough=INERTIA_SHARE * numerics.tolerance)
+    if numerics.analysis == "dynamic" and chooses_steps(scene):
         coarse = pilot()
         if shortest_period(scene) >= SLOW_PERIODS * longest_period(coarse):
-            effect = inertia_of(coarse)
-    if analysis == "auto":
-        allowed = INERTIA_SHARE * numerics.tolerance
-        effect = inertia_of(pilot(), enough=allowed)
-        analysis = "quasi-static" if effect.bound <= allowed else "dynamic"
-        leaves_out = analysis == "quasi-static"
-        if leaves_out:
-            reason = f"moves the tip by at most {effect.bound:.1e} of its largest deflection (allowed {allowed:.1e})"
-            skipped = (Skipped("inertia", reason), *skipped)
-    elif analysis != "dynamic":
-        skipped = (Skipped("inertia", f"analysis = '{analysis}' was asked for"), *skipped)
-    if analysis == "dynamic" and numerics.time_step == "auto" and needs_no_steps(scene):
-        skipped = (*skipped, Skipped("time steps", "held, undamped, under constant loads: eigenvectors once, then cosines"))
-    is_unresolved = analysis == "dynamic" and effect.lasting <= VIBRATION_SHARE * numerics.tolerance
-    passes_over = is_unresolved and _may_pass_over(scene)
-    if passes_over:
-        reason = f"the tissue damps them; what lasts moves the tip by at most {effect.lasting:.1e} of its largest deflection"
-        skipped = (Skipped("steps that follow vibrations", reason), *skipped)
-    unresolved = effect.lasting if passes_over else effect.ringing if is_unresolved else 0.0
-    left_out = effect.bound if leaves_out else unresolved
-    return Choice(analysis, step, skipped, left_out, min(effect.lasting, 1.0), passes_over)
+            return inertia_of(coarse)
+    return Inertia(inf, 1.0, 0.0)
 
 
-def _may_pass_over(scene: Scene) -> bool:
-    """Return whether steps and their method are free, and there is something that damps vibrations."""
-    is_free = _chooses_steps(scene) and "spectral_radius" not in scene.numerics.model_fields_set
-    return is_free and any(layer.damping > 0.0 for layer in scene.tissue.layers)
+def _unresolved(scene: Scene, effect: Inertia, parts: tuple[Part, ...]) -> float:
+    """Return how far vibrations that are not resolved move the tip, relative to its largest deflection."""
+    over = [most_lasting(effect, part.begin, part.end) for part in parts if part.how == PASSED_OVER]
+    if over:
+        return max(over)
+    return effect.ringing if effect.lasting <= VIBRATION_SHARE * scene.numerics.tolerance else 0.0
 
 
 def likely_duration(scene: Scene) -> float:
     """Return how long the run will last [s]; of a push that ends by itself, what a rigid needle would take."""
     slack = PUSH_SLACK if scene.run.duration is None and scene.insertion.kind == "force" else 1.0
     return run_duration(scene) / slack
-
-
-def _chooses_steps(scene: Scene) -> bool:
-    """Return whether automatic time steps want to know how far the needle of a given motion may vibrate."""
-    return scene.numerics.time_step == "auto" and scene.insertion.kind != "force" and not needs_no_steps(scene)
 
 
 def tip_difference(scene: Scene, plant: Plant, finer: Plant, analysis: str = "static") -> float:

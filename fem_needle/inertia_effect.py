@@ -8,7 +8,7 @@ swings and whether the tissue damps it. Derivation: docs/theory.md, "What may be
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, inf, pi, sqrt
@@ -37,7 +37,10 @@ SHALLOW = 0.02  # of the length: shallower `entry` needles are too stiff to matt
 FASTER = 1.3  # what the faster vibrations add to the slowest, whose peaks may lie between two steps
 ROUGH = 10.0  # times a bound from the tip alone
 SUDDEN = 2.0  # a load that comes at once moves an oscillator twice as far as one that comes slowly
-DECAYED = 0.2  # of the first swing is left at the end of the short steps: the tissue damps it
+DECAYED = 0.25  # of the first swing is left at the end of the short steps: the tissue damps it
+LEFT_AFTER = 0.75 * SWINGS  # swings, after which it is looked at what is left
+SETTLING = 4  # long steps, in which the method damps what still swings
+UNDAMPED = 0.9  # of the first swing is left: it may be all of it, seen in few steps
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,44 @@ class _Kink:
     time: float
     depth: float
     frequency: float
+
+
+@dataclass(frozen=True)
+class Response:
+    """What inertia does between two kinks, relative to the largest tip deflection.
+
+    Attributes
+    ----------
+    begin, end
+        Times of the kinks [s].
+    forced
+        While nothing swings any more: what loads and motion do by themselves.
+    swing
+        Largest vibration behind the first kink; one that stays grows by what the needle's way makes of it.
+    left
+        How much of it is left after `LEFT_AFTER` swings, 0 to 1.
+    period
+        Of the slowest vibration [s].
+    """
+
+    begin: float
+    end: float
+    forced: float
+    swing: float
+    left: float
+    period: float
+
+    @property
+    def stays(self) -> bool:
+        """Whether the tissue lets the vibration stay for many swings."""
+        return self.left >= DECAYED
+
+    def at(self, time: float) -> float:
+        """Return what is left of the vibration at a time [s]; it is taken to decay half as fast as it was seen to."""
+        if not self.stays or time < self.begin:
+            return 0.0
+        swings = (time - self.begin) / (2.0 * LEFT_AFTER * self.period) if self.left < UNDAMPED else 0.0
+        return self.swing * float(self.left**swings)
 
 
 @dataclass(frozen=True)
@@ -61,11 +102,23 @@ class Inertia:
         The same without vibrations that the tissue damps within a few swings.
     ringing
         How far vibrations that last move it, by themselves.
+    responses
+        Kink by kink; empty where that was not looked at.
     """
 
     bound: float
     lasting: float
     ringing: float
+    responses: tuple[Response, ...] = ()
+
+    def lasting_at(self, response: Response, time: float) -> float:
+        """Return how far inertia moves the tip at a time [s] between two kinks, but for vibrations that are damped at once."""
+        return SUDDEN * response.forced + sum(other.at(time) for other in self.responses)
+
+    def moving_at(self, response: Response, time: float) -> float:
+        """Return the same with vibrations that are damped at once."""
+        passes = not response.stays and time < response.begin + SWINGS * response.period
+        return self.lasting_at(response, time) + (response.swing if passes else 0.0)
 
 
 def inertia_effect(plant: Plant, enough: float = 0.0) -> float:
@@ -99,9 +152,11 @@ def inertia_of(plant: Plant, enough: float = 0.0) -> Inertia:
         if bound <= enough:
             return Inertia(bound, bound, bound)
     fast = _tips(plant, grid, Integration(DYNAMIC, collocation(0.0)))
-    forced, staying, passing = _bounds(scene, kinks, np.array(grid.outputs), is_short, np.abs(fast - slow))
-    lasting = SUDDEN * forced + staying
-    return Inertia((lasting + passing) / largest, lasting / largest, staying / largest)
+    found = tuple(_responses(scene, kinks, np.array(grid.outputs), is_short, np.abs(fast - slow) / largest))
+    staying = sum(response.swing for response in found if response.stays)
+    passing = max((response.swing for response in found if not response.stays), default=0.0)
+    lasting = SUDDEN * max(response.forced for response in found) + staying
+    return Inertia(lasting + passing, lasting, staying, found)
 
 
 def _slow_bound(plant: Plant, kinks: Sequence[_Kink], time: Array, tips: Array) -> float:
@@ -116,24 +171,21 @@ def _slow_bound(plant: Plant, kinks: Sequence[_Kink], time: Array, tips: Array) 
     return ROUGH * (float(bent) + struck)
 
 
-def _bounds(
+def _responses(
     scene: Scene, kinks: Sequence[_Kink], time: Array, is_short: NDArray[np.bool_], difference: Array
-) -> tuple[float, float, float]:
-    """Return bounds [m] of what loads do, of vibrations that stay and of those that pass, from what inertia does at times [s]."""
-    forced, staying, passing = 0.0, 0.0, 0.0
+) -> Iterator[Response]:
+    """Yield what inertia does from kink to kink, from what it does at times [s]."""
     for number, (kink, following) in enumerate(pairwise(kinks)):
         inside = (time >= kink.time) & (time <= following.time)
         short, long = difference[inside & is_short], difference[inside & ~is_short]
-        level = float(np.max(long, initial=0.0))
-        forced = max(forced, level)
-        if not len(short):
-            continue
-        swing = FASTER * max(float(np.max(short)) - level, 0.0)
-        if float(np.max(short[-len(short) // 4 :])) - level < DECAYED * swing:
-            passing = max(passing, swing)
-        else:
-            staying += swing * _growth(kink, kinks[number + 1 :], is_growing=scene.support.kind == "entry")
-    return forced, staying, passing
+        settled = long[SETTLING:] if len(long) > 2 * SETTLING and len(short) else long
+        level, swing, left = float(np.max(settled, initial=0.0)), 0.0, 0.0
+        if len(short):
+            first, last = (max(float(np.max(part)) - level, 0.0) for part in (short, short[-len(short) // 4 :]))
+            swing, left = FASTER * first, last / first if first > 0.0 else 0.0
+        if left >= DECAYED:
+            swing *= _growth(kink, kinks[number + 1 :], is_growing=scene.support.kind == "entry")
+        yield Response(kink.time, following.time, level, swing, left, 2 * pi / kink.frequency)
 
 
 def _growth(kink: _Kink, later: Sequence[_Kink], *, is_growing: bool) -> float:

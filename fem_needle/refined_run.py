@@ -6,36 +6,23 @@ which step is needed; the next run takes it. Derivation: docs/theory.md, "What m
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from math import ceil, floor, inf, pi, sqrt
+from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.choices import VIBRATION_SHARE, likely_duration, longest_period
 from fem_needle.detuning import detuning
-from fem_needle.dynamics.engine import CREEP
 from fem_needle.dynamics.grid import RunEnd, TimeGrid, time_grid
-from fem_needle.dynamics.push import longest_step
 from fem_needle.errors import ComputationError
 from fem_needle.expectation import Expectation, expectation
-from fem_needle.limits import check_steps
-from fem_needle.motion import shortest_period
-from fem_needle.run_job import Job, begin, collect, integration, shown, total_error, trajectory_of
+from fem_needle.run_job import Job, begin, collect, shown, total_error, trajectory_of
 from fem_needle.sample_arrays import Samples, joined, tips_of
 from fem_needle.trajectory import Trajectory, guide_advice
+from fem_needle.trial_steps import coarsest_step, is_passing, is_undamped, resolving_step, sampled_grid, shares_of
 
 Array = NDArray[np.float64]
 
-FEWEST_STEPS = 25  # of the coarsest trial run
-BEHIND_KINKS = 3  # outputs behind a kink at which runs with long steps are compared
-FEWEST_SAMPLES = 50  # of a finer run: instants at which runs are compared
-STEPS_PER_LOAD_PERIOD = 4  # of the coarsest trial run
-STEPS_PER_NATURAL_PERIOD = 1.5  # with which vibrations are resolved
-LEAST_TURN = 2.25  # that an unresolved vibration must appear to turn over the coarsest run, in rad: differences then show it
-APPARENT = 12.0  # an unresolved vibration appears to turn by 12 / (omega h) in a step
 MOST_RUNS = 14
 MOST_STEPS = 4_000_000
 MOST_MESHES = 6
@@ -64,6 +51,11 @@ class _Trial:
     def step(self) -> float:
         """Largest step [s]."""
         return self.grid.time_step
+
+    @property
+    def shortest(self) -> float:
+        """Largest step [s] of those parts of the run in which steps are shortest."""
+        return self.step * min((share for _, share in self.grid.shares), default=1.0)
 
     @property
     def is_whole(self) -> bool:
@@ -123,7 +115,8 @@ class _Search:
             With the trajectory so far.
         """
         first = self.trials[0].grid if self.trials else None
-        grid = replace(sampled_grid(job, min(step, job.choice.output_step) if final else step), coarser=first)
+        sampled = sampled_grid(job, min(step, job.choice.output_step) if final else step)
+        grid = replace(sampled, shares=first.shares if first else shares_of(job, step), coarser=first)
         blocks = list[Samples]()
         try:
             end = collect(job, grid, blocks, live=False)
@@ -224,12 +217,12 @@ def _first_trial(search: _Search) -> _Trial:
 
 def _find_step(search: _Search, first: _Trial) -> None:
     """Run with ever shorter steps until the estimated error of a run with all outputs is allowed."""
-    order = TIME_ORDER if is_undamped(search.job) else TIME_ORDER - 1
+    order = TIME_ORDER if is_undamped(search.job) and not is_passing(search.job) else TIME_ORDER - 1
     slowest = resolving_step(search.job)
     runs, differences = [first, _finer_run(search, first)], list[float]()
     while True:
         differences.append(difference(*runs[-2:]))
-        resolved = runs[-2].step <= slowest
+        resolved = runs[-2].shortest <= slowest
         expected = expectation([run.step for run in runs], differences, order, resolved=resolved)
         search.error = expected.bound
         if search.error <= search.allowed and runs[-1].is_whole:
@@ -297,69 +290,6 @@ def difference(coarser: _Trial, finer: _Trial) -> float:
     if finer.job.scene.insertion.kind != "force":
         return found
     return max(found, relative(coarser.samples.depth, finer.samples.depth))
-
-
-def is_undamped(job: Job) -> bool:
-    """Return whether the integrator has a spectral radius of 1, and with it its full order."""
-    method = integration(job).method
-    return method is not None and abs(float(np.sum(method.nodes)) - 1.0) < 1e-12
-
-
-def is_graded(job: Job) -> bool:
-    """Return whether the needle relaxes behind kinks, so that steps have to begin short there."""
-    return job.scene.insertion.kind != "force" and (job.choice.passes_over or integration(job).kind == CREEP)
-
-
-def resolving_step(job: Job) -> float:
-    """Return the longest step [s] that resolves the slowest vibration, infinite where none matters."""
-    if job.choice.analysis != "dynamic" or job.choice.vibration <= VIBRATION_SHARE * job.scene.numerics.tolerance:
-        return inf
-    return longest_period(job.plant) / STEPS_PER_NATURAL_PERIOD
-
-
-def coarsest_step(job: Job) -> float:
-    """Return the step [s] of the first trial run: loads are just resolved, and vibrations that matter show in its differences.
-
-    With a spectral radius of 1 a vibration of large omega h appears to turn by 12 / (omega h) in a step h, 12 T / (omega h^2) in
-    the run: runs with different steps disagree about it long before they resolve it. Otherwise it is damped out, and nothing
-    would show it.
-    """
-    duration, resolving = likely_duration(job.scene), resolving_step(job)
-    step = min(duration / FEWEST_STEPS, shortest_period(job.scene) / STEPS_PER_LOAD_PERIOD)
-    if job.scene.insertion.kind == "force":
-        step = min(step, longest_step(job.scene))
-    if resolving == inf or not is_undamped(job):
-        return min(step, resolving)
-    frequency = 2 * pi / (STEPS_PER_NATURAL_PERIOD * resolving)
-    return min(step, max(resolving, sqrt(APPARENT * duration / (LEAST_TURN * frequency))))
-
-
-def sampled_grid(job: Job, step: float) -> TimeGrid:
-    """Return the grid of a trial run with steps of at most ``step`` [s], which samples often enough to be compared.
-
-    Long steps skip outputs, but for those next to kinks; short ones divide them evenly. Steps without inertia, or over vibrations
-    that the tissue damps, are graded behind kinks.
-    """
-    output, duration = job.choice.output_step, likely_duration(job.scene)
-    check_steps(duration, step)
-    grid = replace(time_grid(job.plant, output, output), is_graded=is_graded(job))
-    if step >= output * (1 - 1e-9):
-        every = max(1, floor(step / output * (1 + 1e-9)))
-        chosen = {*range(0, len(grid.outputs), every), len(grid.outputs) - 1}
-        for landing in grid.landings:  # where a run has most to go wrong
-            first = bisect_right(grid.outputs, landing)
-            chosen |= set(range(first, min(first + BEHIND_KINKS, len(grid.outputs))))
-        return replace(grid, outputs=tuple(grid.outputs[index] for index in sorted(chosen)), time_step=every * output)
-    parts = ceil(output / step * (1 - 1e-9))
-    between = ceil(parts / ceil(FEWEST_SAMPLES * output / duration))  # steps from sample to sample
-    samples = ceil(parts / between)
-    times = [grid.outputs[0]]
-    for start, end in pairwise(grid.outputs):
-        count = max(1, ceil((end - start) / output * samples - 1e-9))
-        inner = np.linspace(start, end, count + 1)[1:-1].tolist()
-        times += [time for time in inner if not grid.has_landing(time, 1e-9 * output)]
-        times.append(end)
-    return replace(grid, outputs=tuple(times), time_step=output / (samples * between))
 
 
 def _show(search: _Search) -> Trajectory:

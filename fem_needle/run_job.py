@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time as clock
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
 from fem_needle.choices import Choice
 from fem_needle.collocation import collocation
 from fem_needle.dynamics.engine import DYNAMIC
 from fem_needle.dynamics.grid import RunEnd, TimeGrid, time_grid
+from fem_needle.dynamics.parts import COSINES
 from fem_needle.dynamics.run import VIBRATION, Integration, integration_of, run_samples, spectral_radius
-from fem_needle.dynamics.vibration import needs_no_steps
 from fem_needle.errors import ComputationError
 from fem_needle.models import ChosenPlant
 from fem_needle.plant import Plant
@@ -82,11 +82,13 @@ def shown(job: Job, run: Trajectory, samples: Samples) -> Trajectory:
 
 def integration(job: Job) -> Integration:
     """Return how the needle gets from one time to the next."""
-    if job.choice.analysis == "dynamic" and job.scene.numerics.time_step == "auto" and needs_no_steps(job.plant.scene):
+    parts = job.choice.parts
+    if parts and parts[0].how == COSINES:
         return Integration(VIBRATION)
     if job.choice.passes_over:
         return Integration(DYNAMIC, collocation(0.0))
-    return integration_of(job.plant, job.scene, job.choice.analysis)
+    found = integration_of(job.plant, job.scene, job.choice.analysis)
+    return replace(found, parts=parts) if len(parts) > 1 else found
 
 
 def _warnings(job: Job) -> list[str]:
@@ -163,6 +165,7 @@ def _settings(job: Job, grid: TimeGrid) -> dict[str, Any]:
         "time_step": grid.largest_step,
         "steps": grid.steps,
         "skipped": [asdict(skipped) for skipped in job.choice.skipped],
+        "parts": [asdict(part) for part in job.choice.parts],
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,12 +98,20 @@ class Samples:
         points = int(np.max(chosen["path_points"], initial=0))
         return Samples(**chosen, path_position=self.path_position[:points], path_deflection=self.path_deflection[:points])
 
+    def after(self, before: Samples) -> Samples:
+        """Return the rows with works that go on from the last row of what was before."""
+        return replace(self, **{name: getattr(self, name) + getattr(before, name)[-1] for name in SINCE_START})
+
     def path_at(self, row: int) -> tuple[Array, Array]:
         """Return the path at a row, y and r [m], shape (points,) each."""
         points = self.path_points[row]
         return self.path_position[:points], self.path_deflection[:points]
 
 
+SINCE_START = (
+    "load_work", "hub_work", "tissue_work", "tissue_dissipation", "boundary_energy", "friction_dissipation", "cutting_work",
+    "push_work", "arrest_loss",
+)  # fmt: skip
 OVER_TIME = tuple(field.name for field in fields(Samples) if field.name not in {"path_position", "path_deflection"})
 
 

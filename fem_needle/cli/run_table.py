@@ -29,6 +29,7 @@ EXPLANATION = (
     ),
     ("model", "--model, --modes, --variant, --basis and --static-corrections choose; elements: --elements, --degree, --mesh."),
     ("time step", "--time-step chooses, else the tolerance."),
+    ("inertia", "parts of the run, how the needle got through each of them, and why."),
     ("left out", "terms of the equation of motion that do not matter here, each with its reason."),
     ("run folder", "scene.toml repeats the run; summary.json has this table in SI; series.nc everything over time."),
 )
@@ -53,6 +54,7 @@ def computation_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str
     yield "analysis", str(summary["analysis"])
     yield "model", model_text(summary)
     yield "time step", f"{summary['steps']} steps of up to {summary['time_step']:.4g} s"
+    yield from _part_rows(summary)
     for index, skipped in enumerate(summary.get("skipped", ())):
         yield "" if index else "left out", f"{skipped['term']}: {skipped['reason']}"
     for warning in summary.get("warnings", ()):
@@ -62,6 +64,14 @@ def computation_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str
     yield "run folder", str(folder)
     if (folder / "deflection.pvd").exists():
         yield "ParaView", f"open {folder / 'deflection.pvd'}, Apply, then Filters > Warp By Vector with 'deflection'"
+
+
+def _part_rows(summary: Mapping[str, Any]) -> Iterator[Row]:
+    """Yield how a run with inertia got through its parts, and why."""
+    parts = summary.get("parts", ()) if summary["analysis"] == "dynamic" else ()
+    for index, part in enumerate(parts):
+        when = f"{part['begin']:.4g} to {part['end']:.4g} s: " if len(parts) > 1 else ""
+        yield "" if index else "inertia", f"{when}{part['how']}; {part['reason']}"
 
 
 def _estimate(estimate: float | None, tolerance: float) -> str:

@@ -92,6 +92,12 @@ class Engine:
         """Let other signals act from now on."""
         self._work.drive(drive)
 
+    def use(self, method: Collocation | None) -> None:
+        """Take the steps that follow by another method; None keeps the one that is used."""
+        if method is not None and method is not self.method:
+            self.method = method
+            self._work.use(method)
+
     def land(self) -> None:
         """Take what follows as the other side of a kink."""
         self.live.axial[at.LANDED] = at.KINK

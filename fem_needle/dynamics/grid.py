@@ -34,6 +34,8 @@ class TimeGrid:
         Largest step.
     is_graded
         Whether the first step behind a kink is taken in parts that grow from a thousandth of it.
+    shares
+        Ends of parts of the run and how long steps in them may be, as a share of the largest.
     coarser
         A grid whose own steps are all to be shortened as its largest step is: near kinks and outputs, too.
     """
@@ -42,6 +44,7 @@ class TimeGrid:
     landings: tuple[float, ...]
     time_step: float
     is_graded: bool = False
+    shares: tuple[tuple[float, float], ...] = ()
     coarser: TimeGrid | None = None
 
     def intervals(self) -> Iterator[tuple[float, float, int]]:
@@ -67,11 +70,12 @@ class TimeGrid:
 
     def _longest(self, time: float) -> float:
         """Return how long a step may be at a time [s]."""
+        longest = self.time_step * next((share for end, share in self.shares if time < end), 1.0)
         if self.coarser is None:
-            return self.time_step
+            return longest
         ends, steps = self.coarser.plain_steps
         there = steps[min(bisect_left(ends, time), len(steps) - 1)]
-        return min(self.time_step, there * self.time_step / self.coarser.time_step)
+        return min(longest, there * self.time_step / self.coarser.time_step)
 
     @cached_property
     def plain_steps(self) -> tuple[list[float], list[float]]:

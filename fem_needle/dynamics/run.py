@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,8 +14,9 @@ from fem_needle.dynamics import names as at
 from fem_needle.dynamics.engine import CREEP, DYNAMIC, REST, Engine, failed_step, smooth_stretches
 from fem_needle.dynamics.grid import RunEnd, TimeGrid, ends_by_itself
 from fem_needle.dynamics.massless import massless
+from fem_needle.dynamics.parts import Part, cosines_from, is_passed_over
 from fem_needle.dynamics.push import WHY, Push, longest_step, run_limits
-from fem_needle.dynamics.vibration import Vibration, vibration_samples
+from fem_needle.dynamics.vibration import Vibration, under_way, vibration_samples
 from fem_needle.initial import initial_state
 from fem_needle.limits import check_steps
 from fem_needle.motion import depth_law
@@ -39,15 +40,22 @@ class Integration:
         "dynamic", "creep" (without inertia), "rest" (through equilibria) or "vibration" (eigenvectors once, then cosines).
     method
         Collocation method of steps.
+    parts
+        Of a run with inertia that is not the same throughout; steps over vibrations are Radau IIA's.
     """
 
     kind: str
     method: Collocation | None = None
+    parts: tuple[Part, ...] = ()
 
     @property
     def steps(self) -> bool:
         """Whether time steps are taken that have an error."""
         return self.kind in {DYNAMIC, CREEP}
+
+    def method_at(self, time: float) -> Collocation | None:
+        """Return the method of the steps at a time [s]."""
+        return collocation(0.0) if is_passed_over(self.parts, time) else self.method
 
 
 def integration_of(plant: Plant, scene: Scene, analysis: str) -> Integration:
@@ -98,11 +106,14 @@ def run_samples(plant: Plant, integration: Integration, grid: TimeGrid) -> Gener
 
 
 def _moved(plant: Plant, integration: Integration, grid: TimeGrid) -> Generator[Samples, None, RunEnd]:
-    engine, first = begun(plant, integration), True
-    kinks = {0.0, *grid.landings}
-    for at_kink, intervals in smooth_stretches(grid.intervals(), set(grid.outputs), kinks, plant.size):
+    engine, first, samples = begun(plant, integration), True, None
+    kinks, turns = {0.0, *grid.landings}, {part.begin for part in integration.parts}
+    until = cosines_from(integration.parts)
+    steps = (interval for interval in grid.intervals() if interval[0] < until)
+    for at_kink, intervals in smooth_stretches(steps, set(grid.outputs), kinks | turns, plant.size):
         if at_kink:
             engine.land()
+        engine.use(integration.method_at(float(intervals[0, 0])))
         status, samples = engine.advance(intervals, counted=not first, from_start=first)
         first = False
         if len(samples):
@@ -110,6 +121,11 @@ def _moved(plant: Plant, integration: Integration, grid: TimeGrid) -> Generator[
         if status != at.DONE:
             time, depth = float(engine.live.axial[at.NOW]), float(engine.live.axial[at.WAY])
             raise failed_step(time, depth, WHY[status])
+    if until < grid.outputs[-1] and samples is not None:
+        time, (coordinates, momentum) = float(engine.live.axial[at.NOW]), engine.live.lateral[0]
+        outputs = [output for output in grid.outputs if output > until]
+        for block in _swings(under_way(plant, time, coordinates, momentum), outputs):
+            yield block.after(samples)
     return RunEnd("final-depth" if ends_by_itself(plant.scene) else "duration", grid.steps)
 
 
@@ -133,9 +149,12 @@ def _pushed(plant: Plant, integration: Integration, grid: TimeGrid) -> Generator
 
 
 def _vibrating(plant: Plant, grid: TimeGrid) -> Generator[Samples, None, RunEnd]:
-    vibration = Vibration(plant, initial_state(plant, depth_law(plant.scene)))
-    outputs = np.array(grid.outputs)
+    yield from _swings(Vibration(plant, initial_state(plant, depth_law(plant.scene))), grid.outputs)
+    return RunEnd("duration", grid.steps)
+
+
+def _swings(vibration: Vibration, outputs: Sequence[float]) -> Iterator[Samples]:
+    """Yield the samples of a needle that swings without steps."""
     marks = [*range(0, len(outputs), SAMPLES_AT_ONCE), len(outputs)]
     for first, last in pairwise(marks):
-        yield vibration_samples(vibration, outputs[first:last])
-    return RunEnd("duration", grid.steps)
+        yield vibration_samples(vibration, np.array(outputs[first:last]))

@@ -17,11 +17,12 @@ from fem_needle import banded
 from fem_needle.free_response import frozen_matrices, vibrations
 from fem_needle.initial import initial_state
 from fem_needle.ledger import StepEnd
-from fem_needle.loads import is_steady, turns_with_needle
+from fem_needle.loads import is_steady, load_case, turns_with_needle
 from fem_needle.motion import depth_law
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene
+from fem_needle.stages import StageSolution, evaluate_stage
 from fem_needle.statics import static_state
 
 Array = NDArray[np.float64]
@@ -29,11 +30,15 @@ Array = NDArray[np.float64]
 
 def needs_no_steps(scene: Scene) -> bool:
     """Return whether eigenvectors and cosines give a dynamic run: a held, undamped, clamped needle under constant loads."""
+    return scene.insertion.kind == "hold" and is_steady(scene) and is_free_to_swing(scene)
+
+
+def is_free_to_swing(scene: Scene) -> bool:
+    """Return whether a needle that is held swings without damping, memory, guides or a hub that gives way, exactly (radius 1)."""
     tissue = scene.tissue
     is_free = tissue.rest_line == "straight" and not any(layer.damping > 0 for layer in tissue.layers)
-    is_held = scene.insertion.kind == "hold" and is_steady(scene)
     is_clamped = not scene.support.guides and not turns_with_needle(scene)
-    return is_free and is_held and is_clamped and scene.numerics.spectral_radius == 1.0 and scene.model.variant != "as-printed"
+    return is_free and is_clamped and scene.numerics.spectral_radius == 1.0 and scene.model.variant != "as-printed"
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +129,16 @@ def _energies(matrix: Array, vectors: NDArray[np.longdouble]) -> NDArray[np.long
             columns = slice(max(0, offset), size - max(0, -offset))
             found += np.sum(diagonal.astype(np.longdouble)[:, None] * vectors[rows] * vectors[columns], axis=0)
     return found
+
+
+def under_way(plant: Plant, time: float, coordinates: Array, momentum: Array) -> Vibration:
+    """Return the vibration of a needle that is held from a time [s] on, with what it brings along."""
+    law = depth_law(plant.scene)
+    case = load_case(plant.scene, law.depth(time), time)
+    stage, clamped, velocities = evaluate_stage(plant, law.after(time), case), plant.prescribed, np.zeros(plant.size)
+    mass = banded.to_dense(banded.trailing(stage.operators.mass, clamped))
+    velocities[clamped:] = np.linalg.solve(mass, momentum[clamped:])
+    return Vibration(plant, StepEnd(stage, StageSolution(coordinates.copy(), velocities, momentum.copy(), case.forces), None))
 
 
 def vibrating_tips(plant: Plant, times: Array) -> Array:

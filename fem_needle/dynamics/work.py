@@ -53,6 +53,11 @@ class Work:
         self.table[name, 0] = array.__array_interface__["data"][0]
         self.table[name, 1 : 1 + array.ndim] = array.shape
 
+    def use(self, method: Collocation) -> None:
+        """Let steps be taken by a method."""
+        for name, array in _method_arrays(method).items():
+            self.put(name, array)
+
     def drive(self, drive: Drive) -> None:
         """Let signals act."""
         self.put(at.SIGNALS, drive.rows)

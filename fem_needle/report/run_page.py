@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -158,9 +158,16 @@ def _model(summary: dict[str, Any]) -> str:
 
 def _inertia(summary: dict[str, Any]) -> tuple[tuple[str, str], ...]:
     found = [item for item in _list(summary, "skipped") if isinstance(item, dict) and item.get("term") == "inertia"]
-    if not found:
-        return ()
-    return (("Inertia", f"Inertia was left out: {tidy(str(found[0].get('reason')))}."),)
+    if found:
+        return (("Inertia", f"Inertia was left out: {tidy(str(found[0].get('reason')))}."),)
+    parts = [part for part in _list(summary, "parts") if isinstance(part, dict)]
+    told = [f"{_when(part, parts)}{part['how']}: {tidy(str(part['reason']))}." for part in parts]
+    return (("Inertia", " ".join(told)),) if told else ()
+
+
+def _when(part: dict[str, Any], parts: Sequence[dict[str, Any]]) -> str:
+    """Return when a part of a run was, if it was not the whole."""
+    return f"{quantity(part['begin'], 's')} to {quantity(part['end'], 's')}: " if len(parts) > 1 else ""
 
 
 def _skipped_sections(summary: dict[str, Any]) -> tuple[Section, ...]:

@@ -65,6 +65,7 @@ RANKS = {
     "skipping": 9,
     "inertia_effect": 11,
     "trajectory": 11,
+    "run_parts": 11.5,
     "choices": 12,
     "detuning": 13,
     "sensing": 12,
@@ -75,6 +76,7 @@ RANKS = {
     "vtk_export": 12,
     # whole runs
     "run_job": 13,
+    "trial_steps": 13.5,
     "refined_run": 14,
     "simulation": 15,
     # studies

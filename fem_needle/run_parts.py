@@ -1,0 +1,132 @@
+"""Which parts of a run need inertia, and how: steps that follow vibrations, steps over them, cosines, no inertia at all.
+
+A part begins at a kink (of speed, load, hub; an interface) whose response matters, and ends where the tissue has damped it.
+Derivation: docs/theory.md, "What may be left out".
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
+from itertools import groupby, pairwise
+
+import numpy as np
+
+from fem_needle.dynamics.engine import REST
+from fem_needle.dynamics.grid import output_times
+from fem_needle.dynamics.parts import COSINES, CREEP_STEPS, EQUILIBRIA, FOLLOWED, PASSED_OVER, Part
+from fem_needle.dynamics.run import without_inertia
+from fem_needle.dynamics.vibration import is_free_to_swing, needs_no_steps
+from fem_needle.inertia_effect import Inertia
+from fem_needle.motion import depth_law, landing_times, lateral_values, run_duration
+from fem_needle.scene import Scene, Sinusoid, as_function
+
+VIBRATION_SHARE = 0.5  # of the tolerance: smaller vibrations need not be resolved
+LEAST_QUIET = 0.05  # of a run: shorter parts in which steps may be long are not worth it
+INSTANTS = 201  # of a part, at which it is looked whether anything moves
+HELD = "held, undamped, under constant loads: eigenvectors once, no steps"
+LEAST_HOLD = 3  # outputs: a shorter hold is not worth eigenvectors
+
+
+def without_inertia_throughout(scene: Scene, analysis: str, reason: str) -> Part:
+    """Return the only part of a run without inertia."""
+    rests = analysis == "static" or without_inertia(scene).kind == REST
+    return Part(0.0, run_duration(scene), EQUILIBRIA if rests else CREEP_STEPS, f"inertia {reason}")
+
+
+def chooses_steps(scene: Scene) -> bool:
+    """Return whether automatic time steps want to know how far the needle of a given motion may vibrate."""
+    return scene.numerics.time_step == "auto" and scene.insertion.kind != "force" and not needs_no_steps(scene)
+
+
+def parts_with_inertia(scene: Scene, effect: Inertia, output_step: float) -> tuple[Part, ...]:
+    """Return the parts of a dynamic run; ``effect`` is what inertia does on a coarse needle."""
+    duration = run_duration(scene)
+    if not chooses_steps(scene):
+        return (_whole(scene),)
+    if not effect.responses:
+        begins = "the needle is let go" if scene.initial.shape != "equilibrium" else "loads swing as fast as the needle does"
+        return (Part(0.0, duration, FOLLOWED, begins),)
+    allowed, is_free = VIBRATION_SHARE * scene.numerics.tolerance, "spectral_radius" not in scene.numerics.model_fields_set
+    is_damped = any(layer.damping > 0.0 for layer in scene.tissue.layers)
+    lasts = f"what lasts moves the tip by up to {effect.lasting:.1e} of its largest deflection (allowed {allowed:.1e})"
+    if effect.lasting <= allowed:
+        how = PASSED_OVER if is_free and is_damped else FOLLOWED
+        return (Part(0.0, duration, how, f"{'of inertia' if how == FOLLOWED else 'the tissue damps vibrations,'} {lasts}"),)
+    outputs = output_times(duration, output_step)
+    parts = _alternating(scene, effect, allowed, outputs) if is_free else (Part(0.0, duration, FOLLOWED, f"of inertia {lasts}"),)
+    return _with_cosines(scene, parts, outputs)
+
+
+def _whole(scene: Scene) -> Part:
+    """Return the only part of a run whose steps are not free, or that needs none."""
+    duration = run_duration(scene)
+    if scene.insertion.kind == "force":
+        return Part(0.0, duration, FOLLOWED, "a force drives the needle, whose mass it accelerates")
+    if scene.numerics.time_step != "auto":
+        return Part(0.0, duration, FOLLOWED, "numerics.time_step was given")
+    return Part(0.0, duration, COSINES, HELD)
+
+
+def _alternating(scene: Scene, effect: Inertia, allowed: float, outputs: Sequence[float]) -> tuple[Part, ...]:
+    """Return parts in which vibrations are followed and parts in which they are passed over."""
+    duration, found = run_duration(scene), list[tuple[float, float, bool]]()
+    for moves, group in groupby(_pieces(effect, allowed, outputs), lambda piece: piece[2]):
+        rows = list(group)
+        begin, end = rows[0][0], rows[-1][1]
+        is_followed = moves or end - begin < LEAST_QUIET * duration
+        if found and found[-1][2] == is_followed:
+            begin = found.pop()[0]
+        found.append((begin, end, is_followed))
+    return tuple(_part(effect, allowed, *row) for row in found)
+
+
+def _pieces(effect: Inertia, allowed: float, outputs: Sequence[float]) -> Iterator[tuple[float, float, bool]]:
+    """Yield (begin, end, whether vibrations must be followed) from kink to kink, and where one has decayed at an output."""
+    for response in effect.responses:
+        if effect.moving_at(response, response.begin) <= allowed:
+            yield response.begin, response.end, False
+            continue
+        times = outputs[bisect_right(outputs, response.begin) : bisect_left(outputs, response.end)]
+        quiet = next((time for time in times if effect.moving_at(response, time) <= allowed), response.end)
+        yield response.begin, quiet, True
+        if quiet < response.end:
+            yield quiet, response.end, False
+
+
+def _part(effect: Inertia, allowed: float, begin: float, end: float, is_followed: bool) -> Part:
+    moved = most_lasting(effect, begin, end)
+    how = FOLLOWED if is_followed else PASSED_OVER
+    return Part(begin, end, how, f"inertia moves the tip by up to {moved:.1e} of its largest deflection (allowed {allowed:.1e})")
+
+
+def most_lasting(effect: Inertia, begin: float, end: float) -> float:
+    """Return how far inertia moves the tip at most between two times [s], but for vibrations that are damped at once."""
+    inside = [response for response in effect.responses if response.begin < end and response.end > begin]
+    return max(effect.lasting_at(response, max(begin, response.begin)) for response in inside)
+
+
+def _with_cosines(scene: Scene, parts: Sequence[Part], outputs: Sequence[float]) -> tuple[Part, ...]:
+    """Let cosines take over where the needle is held at last, undamped and under constant loads."""
+    duration = run_duration(scene)
+    held = _held_from(scene)
+    behind, last = outputs[bisect_right(outputs, held + 1e-9 * duration) :], parts[-1]
+    if len(behind) < LEAST_HOLD or last.how != FOLLOWED or last.begin >= behind[0]:
+        return tuple(parts)
+    before = Part(last.begin, behind[0], last.how, last.reason)
+    return (*parts[:-1], before, Part(behind[0], duration, COSINES, HELD))
+
+
+def _held_from(scene: Scene) -> float:
+    """Return since when the needle is held for good under constant loads, without anything that damps it [s]."""
+    duration, law = run_duration(scene), depth_law(scene)
+    values = [as_function(value) for value in lateral_values(scene)]
+    if not is_free_to_swing(scene) or any(isinstance(value, Sinusoid) for value in values):
+        return duration
+    held = duration
+    for begin, end in reversed(list(pairwise([0.0, *landing_times(scene, law, duration, 0.0), duration]))):
+        times = np.linspace(begin, end, INSTANTS)[1:-1]
+        if np.any(law.speeds(times) != 0.0) or any(np.any(value.derivative(times) != 0.0) for value in values):
+            break
+        held = begin
+    return held
