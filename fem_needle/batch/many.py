@@ -16,6 +16,7 @@ from fem_needle.display import Card, Shown, in_millimeters
 from fem_needle.dynamics import warming
 from fem_needle.errors import ComputationError, SceneError, SuspiciousValueWarning
 from fem_needle.models import build_plant
+from fem_needle.progress_bar import ProgressBar
 from fem_needle.scene import Scene
 from fem_needle.simulation import run_scene, simulate
 from fem_needle.threads import one_thread
@@ -101,7 +102,7 @@ def simulate_many(
     threads
         How many to use; default: as many as there are cores.
     progress
-        Is told which fraction of the runs is done.
+        Is told which fraction of the runs is done; default: a bar on stderr, after a second, on terminals and in notebooks.
     cores, vibrations
         Of former versions: ``cores`` is ``threads``, ``vibrations`` changes nothing.
 
@@ -133,11 +134,11 @@ def simulate_many(
     many = _all(scenes, parameters)
     if time_step is not None:
         many = [scene.with_value("numerics.time_step", time_step) for scene in many]
-    return _gathered(many, tuple(variables), threads or cores or os.cpu_count() or 1, progress or _nobody)
-
-
-def _nobody(fraction: float) -> None:
-    """Tell nobody."""
+    bar = ProgressBar(f"{len(many)} runs", needs_reader=True)
+    try:
+        return _gathered(many, tuple(variables), threads or cores or os.cpu_count() or 1, progress or bar.progress)
+    finally:
+        bar.stop()
 
 
 def _all(scenes: Scene | Sequence[Scene], parameters: Mapping[str, ArrayLike] | None) -> list[Scene]:

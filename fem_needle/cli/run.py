@@ -74,8 +74,8 @@ def _positions(mesh: Path) -> list[float]:
 
 def _run(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool) -> None:
     """Compute, write and show a run."""
-    from fem_needle.cli.run_progress import Observers, ProgressBar
     from fem_needle.cli.run_table import run_rows
+    from fem_needle.progress_bar import Observers, ProgressBar
     from fem_needle.run_folder import RunFolderWriter
     from fem_needle.simulation import run_scene
 

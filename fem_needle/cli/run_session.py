@@ -14,7 +14,7 @@ from fem_needle.errors import ComputationError, NeedleError, no_memory
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from fem_needle.cli.run_progress import ProgressBar
+    from fem_needle.progress_bar import ProgressBar
     from fem_needle.run_folder import RunFolderWriter
     from fem_needle.scene import Scene
     from fem_needle.trajectory import Trajectory

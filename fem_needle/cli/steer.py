@@ -99,10 +99,10 @@ def _explain(*, to_stderr: bool) -> None:
 
 def _steer(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool) -> None:
     """Compute, write and show a loop."""
-    from fem_needle.cli.run_progress import ProgressBar
     from fem_needle.cli.steer_table import steer_rows
     from fem_needle.closed_loop.picture import steer_picture
     from fem_needle.closed_loop.steering import steer as compute
+    from fem_needle.progress_bar import ProgressBar
     from fem_needle.run_folder import RunFolderWriter
 
     target.check()
@@ -119,12 +119,12 @@ def _steer(scene: Scene, target: RunTarget, *, vtk: bool, quiet: bool) -> None:
 
 def _repeat(scene: Scene, repetitions: int, target: RunTarget, *, quiet: bool) -> None:
     """Compute, write and show many runs of a loop."""
-    from fem_needle.cli.run_progress import ProgressBar
     from fem_needle.cli.short_path import short_path
     from fem_needle.cli.steer_table import repeat_rows
     from fem_needle.closed_loop.repeated_picture import repeated_picture
     from fem_needle.closed_loop.repeating import repeat as compute
     from fem_needle.limits import MOST_REPETITIONS
+    from fem_needle.progress_bar import ProgressBar
     from fem_needle.study_files import StudyFolder
 
     if not 1 <= repetitions <= MOST_REPETITIONS:

@@ -35,8 +35,8 @@ def stress(
         if value is not None and value < least:
             raise SceneError(f"{name}: too few (got {value}; allowed from {least} on)")
     from fem_needle.atomic_file import write_atomically
-    from fem_needle.cli.run_progress import ProgressBar
     from fem_needle.cli.tables import new_table, show
+    from fem_needle.progress_bar import ProgressBar
     from fem_needle.stress import stress as put_through
 
     bar = ProgressBar("scenes under stress")

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from fem_needle.cli.run_progress import ProgressBar
 from fem_needle.dynamics.notice import watched
+from fem_needle.progress_bar import ProgressBar
 
 
 @contextmanager

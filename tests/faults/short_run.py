@@ -9,10 +9,10 @@ from pathlib import Path
 import typer
 
 from fem_needle import Insertion
-from fem_needle.cli.run_progress import ProgressBar
 from fem_needle.cli.run_session import finished
 from fem_needle.errors import SceneError
 from fem_needle.manifest import is_run_folder
+from fem_needle.progress_bar import ProgressBar
 from fem_needle.run_folder import RunFolderWriter, load_run
 from fem_needle.run_target import RunTarget
 from fem_needle.simulation import run_scene

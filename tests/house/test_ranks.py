@@ -12,6 +12,7 @@ RANKS = {
     # no other room
     "banded": 0,
     "collocation": 0,
+    "progress_bar": 1,
     "display": 0,
     "frames": 0,
     "gauss": 0,

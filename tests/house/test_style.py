@@ -10,6 +10,7 @@ LONGEST_FILE = 400
 SOURCE = python_files(*PACKAGES)
 # Where an import inside a function is right: commands load what they use, a result reaches its folder late.
 LATE_IMPORTS = {
+    ("fem_needle.progress_bar", "_show"),  # rich, where something takes long
     ("fem_needle.trajectory", "save"),
     ("fem_needle.trajectory", "load"),
     ("fem_needle.view.picture", "_rendered"),  # VTK, in the process that draws

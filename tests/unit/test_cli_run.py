@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 import pyvista
 
-from fem_needle import load_scene
-from fem_needle.cli import run_progress
+from fem_needle import load_scene, progress_bar
 from fem_needle.cli.settings import value_of
 from fem_needle.errors import ComputationError
 from fem_needle.run_folder import RunFolderWriter, load_run
@@ -32,7 +31,7 @@ def run(command_line, monkeypatch, tmp_path):
 
 
 def test_a_run_shows_a_table_and_leaves_a_folder(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("fem_needle.cli.run_progress.PATIENCE", 1e3)  # a busy machine shows no bar either
+    monkeypatch.setattr("fem_needle.progress_bar.PATIENCE", 1e3)  # a busy machine shows no bar either
     status, out, err = run("thesis", *SHORT)
     assert (status, err) == (0, "")
     loaded = load_run(tmp_path / "runs" / "thesis")
@@ -192,7 +191,7 @@ def test_a_failed_computation_says_where_its_rows_are(run, monkeypatch, tmp_path
 
 
 def test_a_progress_bar_where_it_takes_long(run, monkeypatch):
-    monkeypatch.setattr(run_progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(progress_bar, "PATIENCE", 0.0)
     _, out, err = run("thesis", *SHORT)
     assert "Thesis needle" in err
     assert "100%" in err

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 import xarray
 
-from fem_needle import Gains, load_scene, parse_scene, save_scene, steer
-from fem_needle.cli import run_progress
+from fem_needle import Gains, load_scene, parse_scene, progress_bar, save_scene, steer
 from fem_needle.cli.steer_settings import steered
 from fem_needle.closed_loop.picture import LoopCurves
 from fem_needle.closed_loop.repeated_picture import mean_path
@@ -62,7 +61,7 @@ def scene():
 def run(command_line, monkeypatch, tmp_path):
     """Run `steer` on the short loop, in a folder with nothing else; return status, stdout, stderr."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(run_progress, "PATIENCE", 1e3)  # a busy machine shows no bar either
+    monkeypatch.setattr(progress_bar, "PATIENCE", 1e3)  # a busy machine shows no bar either
     Path("short.toml").write_text(SHORT, encoding="utf-8")
     return partial(command_line, "steer", "short.toml")
 
@@ -235,7 +234,7 @@ def interrupting_at(share):
 
 
 def test_an_interrupt_keeps_what_was_computed(run, monkeypatch):
-    monkeypatch.setattr(run_progress.ProgressBar, "progress", interrupting_at(0.5))
+    monkeypatch.setattr(progress_bar.ProgressBar, "progress", interrupting_at(0.5))
     status, out, err = run("--no-vtk")
     assert (status, out) == (1, "")
     assert "interrupted at time 0.5 s" in err
@@ -311,7 +310,7 @@ def test_a_scene_that_is_wrong_in_every_repetition_is_wrong_input(run):
 
 
 def test_an_interrupt_keeps_the_repetitions_that_are_done(run, monkeypatch):
-    monkeypatch.setattr(run_progress.ProgressBar, "progress", interrupting_at(0.6))
+    monkeypatch.setattr(progress_bar.ProgressBar, "progress", interrupting_at(0.6))
     status, _, err = run("--repeat", "3")
     assert status == 1
     assert "interrupted after 1 of 3 repetitions" in err

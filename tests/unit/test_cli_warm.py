@@ -51,7 +51,7 @@ class Terminal(io.StringIO):
 @pytest.mark.parametrize("stream", [Terminal, io.StringIO])
 def test_a_terminal_shows_a_bar(monkeypatch, stream):
     monkeypatch.setattr(sys, "stderr", stream())
-    monkeypatch.setattr("fem_needle.cli.run_progress.PATIENCE", 0.0)
+    monkeypatch.setattr("fem_needle.progress_bar.PATIENCE", 0.0)
     with compilations_shown():
         notice.begun("time loop", 20, is_kept=True)
         for share in (0.3, 1.0):

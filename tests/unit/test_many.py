@@ -130,3 +130,14 @@ def test_what_is_computed_survives_a_run_that_fails(monkeypatch):
     tips = caught.value.partial.tip_deflection
     assert np.isfinite(tips[:2]).all()
     assert np.isnan(tips[2]).all()
+
+
+def test_a_bar_is_shown_by_default_and_only_to_somebody_who_looks(monkeypatch, capsys):
+    monkeypatch.setattr("fem_needle.progress_bar.PATIENCE", 0.0)
+    scene = GIVEN
+    simulate_many(scene, {"loads.0.force": [0.1, 0.2]})
+    assert capsys.readouterr().err == ""
+    monkeypatch.setenv("TTY_COMPATIBLE", "1")
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    simulate_many(scene, {"loads.0.force": [0.1, 0.2]})
+    assert "2 runs" in capsys.readouterr().err

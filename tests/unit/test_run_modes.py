@@ -42,7 +42,7 @@ def test_two_modes_do_not_warn_inside_their_range(run):
 
 
 def test_the_table_names_model_modes_variant_and_basis(run, monkeypatch):
-    monkeypatch.setattr("fem_needle.cli.run_progress.PATIENCE", 1e3)  # a busy machine shows no bar either
+    monkeypatch.setattr("fem_needle.progress_bar.PATIENCE", 1e3)  # a busy machine shows no bar either
     options = ("--modes", "3", "--variant", "corrected", "--basis", "inserted-length")
     status, out, err = run("thesis", "--model", "assumed-modes", *options, "--no-vtk", "--output-step", "4")
     assert (status, err) == (0, "")
