@@ -7,16 +7,18 @@ usual ones. Why a bubble: docs/decisions/0002-quartic-elements.md.
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
-import skfem
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+KEPT = Path(__file__).with_name("reference.json")
 BUBBLE_ENERGY = 204.8  # integral of (second derivative of 16 x^2 (1 - x)^2)^2 over the unit element
 
 # Rows: coefficients of 1, x, x^2, x^3, x^4 on the unit element, slopes by x.
@@ -31,26 +33,9 @@ _COEFFICIENTS = np.array(
 )
 
 
-class HermiteWithBubble(skfem.ElementLineHermite):
-    """Hermite line element with one interior coordinate: how far the middle stands off the cubic."""
-
-    interior_dofs = 1
-    maxdeg = 4
-    dofnames = ["u", "u_x", "bubble"]  # noqa: RUF012 (scikit-fem's interface)
-    doflocs = np.array([[0.0], [0.0], [1.0], [1.0], [0.5]])
-
-    def gdof(self, F, w, i):  # type: ignore[no-untyped-def]
-        """Evaluate coordinate ``i`` of a function given with its derivatives."""
-        if i < 4:
-            return super().gdof(F, w, i)
-        (left,), (right,) = w["v"][0], w["v"][1]
-        middle = 0.5 * (F[()](left) + F[()](right)) + (right - left) / 8 * (F[(0,)](left) - F[(0,)](right))
-        return F[()](0.5 * (left + right)) - middle
-
-
 @dataclass(frozen=True)
 class ReferenceElement:
-    """Matrices on the unit element, assembled once with scikit-fem.
+    """Matrices on the unit element, assembled once with scikit-fem (`fem_needle.elements.assembly`).
 
     Attributes
     ----------
@@ -103,23 +88,6 @@ def _derivative_coefficients(degree: int, derivative: int) -> Array:
 
 @lru_cache
 def reference_element(degree: int) -> ReferenceElement:
-    """Assemble the reference matrices of degree 3 or 4 with scikit-fem.
-
-    The unit cell alone is assembled: scikit-fem's global Vandermonde matrices lose digits as cells get small.
-    """
-    element = skfem.ElementLineHermite() if degree == 3 else HermiteWithBubble()
-    basis = skfem.Basis(skfem.MeshLine(np.array([0.0, 1.0])), element, intorder=2 * degree + 2)
-    order = np.array([0, 1, 2, 3] if degree == 3 else [0, 1, 4, 2, 3])
-
-    def assembled(integrand: object) -> Array:
-        dense = skfem.BilinearForm(integrand).assemble(basis).toarray()
-        return dense[np.ix_(order, order)]
-
-    return ReferenceElement(
-        degree,
-        # Exact multiples of 0.2: the last digit, times (elements)^4, is an error of the tip.
-        bending=np.round(assembled(lambda u, v, w: u.hess[0, 0] * v.hess[0, 0]), 9) + 0.0,
-        mass=assembled(lambda u, v, w: u * v),
-        drag=np.stack([assembled(lambda u, v, w, p=p: w.x[0] ** p * u.grad[0] * v) for p in (0, 1)]),
-        slip=np.stack([assembled(lambda u, v, w, p=p: w.x[0] ** p * u.grad[0] * v.grad[0]) for p in (0, 1, 2)]),
-    )
+    """Return the element of degree 3 or 4, with the matrices that are kept."""
+    kept = json.loads(KEPT.read_text(encoding="utf-8"))[str(degree)]
+    return ReferenceElement(degree, **{name: np.array(values) for name, values in kept.items()})

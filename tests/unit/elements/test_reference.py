@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from fem_needle.elements.reference import BUBBLE_ENERGY, reference_element
+from fem_needle.elements.assembly import assembled, write
+from fem_needle.elements.reference import BUBBLE_ENERGY, KEPT, reference_element
 
 
 def polynomials(degree):
@@ -16,6 +17,17 @@ def polynomials(degree):
 def integral(one, other, power=0):
     whole = (one * other * Polynomial([0, 1]) ** power).integ()
     return whole(1.0) - whole(0.0)
+
+
+@pytest.mark.parametrize("degree", [3, 4])
+def test_what_is_kept_is_what_scikit_fem_assembles(degree):
+    for name, matrix in assembled(degree).items():
+        assert np.max(np.abs(getattr(reference_element(degree), name) - matrix)) <= 1e-15 * np.max(np.abs(matrix))
+
+
+def test_the_file_is_written_as_it_is_kept(tmp_path):
+    write(tmp_path / "reference.json")
+    assert len((tmp_path / "reference.json").read_text().splitlines()) == len(KEPT.read_text().splitlines())
 
 
 @pytest.mark.parametrize("degree", [3, 4])
