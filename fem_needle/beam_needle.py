@@ -46,6 +46,7 @@ class BeamNeedle(ABC):
     largest_spectral_radius = 1.0
     warnings: tuple[str, ...] = ()
     is_polynomial = True
+    nearly_dependent = False
 
     def __init__(self, scene: Scene, shapes: Shapes, frame: Frame, beam: Beam) -> None:
         self.scene = scene

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fem_needle import banded
 from fem_needle.beam_matrices import Beam, stretched_part, whole_needle
 from fem_needle.beam_needle import BeamNeedle
+from fem_needle.dynamics.resolve import RESOLUTION
 from fem_needle.errors import SceneError
 from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
 from fem_needle.plant import Operators
@@ -32,7 +33,6 @@ INDEPENDENT_MODES = 2  # of the full length, that are told apart at any depth
 # What a step does not resolve must be damped: combinations of nearly parallel modes, whose bending grows as a high power of the
 # depth, and the force of a rigid guide on smooth shapes, an index-3 constraint.
 STABLE_SPECTRAL_RADIUS = 0.0
-RESOLUTION = 1e-12  # rounding leaves the mass of what is kept right to 2e-4: below the usual tolerance
 
 
 class AssumedModeNeedle(BeamNeedle):
@@ -93,7 +93,7 @@ class AssumedModeNeedle(BeamNeedle):
         self.corrections = shapes.size - count - 2
         grown = shapes.size - 2 if isinstance(frame, FixedFrame) else 0
         self.nearly_dependent = grown > INDEPENDENT_MODES
-        self.is_polynomial = not self.nearly_dependent and scene.model.variant != "as-printed"
+        self.is_polynomial = scene.model.variant != "as-printed"
         self.axial_force_acts = scene.model.variant == "conservative"
         self.warnings = (*variant_warnings(scene), *correction_warnings(scene))
         if self.nearly_dependent or any(guide.stiffness == "rigid" for guide in scene.support.guides):

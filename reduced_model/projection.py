@@ -42,7 +42,7 @@ class ProjectedNeedle:
     """
 
     axial_force_acts = True
-    is_polynomial = False
+    nearly_dependent = False
 
     def __init__(self, needle: FiniteElementNeedle, basis: Basis) -> None:
         self.needle = needle
@@ -55,6 +55,8 @@ class ProjectedNeedle:
         parallel = basis.moves and basis.count > INDEPENDENT_MODES
         guided = any(guide.stiffness == "rigid" for guide in needle.scene.support.guides)
         self.largest_spectral_radius = STABLE_SPECTRAL_RADIUS if parallel or guided else 1.0
+        self.is_polynomial = not basis.moves
+        self.frame, self.foundation, self.turns = needle.frame, needle.foundation, needle.turns
         self.warnings = needle.warnings
         self._rigid = np.column_stack([needle.straight(1.0, 0.0), needle.straight(0.0, 1.0)])
 
@@ -171,6 +173,11 @@ class ProjectedNeedle:
     def describe(self) -> dict[str, int | float | str]:
         """Return kind, number of columns and of elements."""
         return {"model": "projected", "modes": self.basis.count, "elements": self.needle.mesh.elements}
+
+    @property
+    def shapes(self) -> ProjectedNeedle:
+        """The functions that the columns are (`polynomials`)."""
+        return self
 
     def polynomials(self) -> PiecewisePolynomials | None:
         """Return 1, x and the columns as polynomials on the elements; None where the columns move with the depth."""

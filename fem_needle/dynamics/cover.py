@@ -52,6 +52,30 @@ def place_rate(y, depth, frame):
 
 
 @inner
+def values_at(coef, nodes, piece, x, out):
+    """Set the shapes of a piece at a place, out[0] (m,)."""
+    place = min(max((x - nodes[piece]) / (nodes[piece + 1] - nodes[piece]), 0.0), 1.0)
+    for i in range(coef.shape[1]):
+        value = 0.0
+        for power in range(coef.shape[2] - 1, -1, -1):
+            value = value * place + coef[piece, i, power]
+        out[0, i] = value
+
+
+@inner
+def slopes_at(coef, nodes, piece, x, out):
+    """Set the shapes of a piece at a place, and their slopes, out[:2] (2, m)."""
+    size = nodes[piece + 1] - nodes[piece]
+    place = min(max((x - nodes[piece]) / size, 0.0), 1.0)
+    for i in range(coef.shape[1]):
+        value, slope = 0.0, 0.0
+        for power in range(coef.shape[2] - 1, -1, -1):
+            slope = slope * place + value
+            value = value * place + coef[piece, i, power]
+        out[0, i], out[1, i] = value, slope / size
+
+
+@inner
 def shapes_at(coef, nodes, piece, x, out):
     """Set the shapes of a piece at a place, their slopes and their curvatures (3, m)."""
     size = nodes[piece + 1] - nodes[piece]
@@ -82,7 +106,10 @@ def add_part(a, b, piece, k, c, power, coef, nodes, quad, shape, matrices):
     for point in range(quad.shape[1]):
         x = a + (b - a) * quad[0, point]
         weight = (b - a) * quad[1, point]
-        shapes_at(coef, nodes, piece, x, shape)
+        if c == 0.0:
+            values_at(coef, nodes, piece, x, shape)
+        else:
+            slopes_at(coef, nodes, piece, x, shape)
         moves = x if power else 1.0
         for i in range(m):
             share = weight * shape[0, i]
@@ -135,8 +162,8 @@ def whole_block(k, c, units, matrices):
 
 @inner
 def add_parts(course, nodes, coef, quad, switches, numbers, layers, shape, matrices):
-    """Add the parts of cut pieces, and a spring at the tip, to the blocks' tissue matrices (B, 4, m, m)."""
-    frame, pieces, stride = switches[ix.FRAME], len(nodes) - 1, switches[ix.STRIDE]
+    """Add the parts of cut elements, and a spring at the tip, to the elements' tissue matrices (B, 4, m, m)."""
+    frame, pieces = switches[ix.FRAME], len(nodes) - 1
     power = 1 if frame == ix.STRETCHED else 0
     for number in range(layers.shape[0]):
         layer = layers[number]
@@ -149,16 +176,22 @@ def add_parts(course, nodes, coef, quad, switches, numbers, layers, shape, matri
             if a >= end:
                 break
             if b > a and not (a == nodes[piece] and b == nodes[piece + 1]):
-                block = piece if stride else 0
-                add_part(a, b, piece, k, c, power, coef, nodes, quad, shape, matrices[block])
-    if numbers[ix.TIP_STIFFNESS] != 0.0:
-        tip = tip_place(course[ix.DEPTH], frame, numbers[ix.LENGTH])
-        piece, k = locate(nodes, tip), numbers[ix.TIP_STIFFNESS] / course[ix.STRETCH]  # the spring itself is not stretched
-        shapes_at(coef, nodes, piece, tip, shape)
-        block = piece if stride else 0
-        for i in range(coef.shape[1]):
-            for j in range(coef.shape[1]):
-                matrices[block, ix.TISSUE, i, j] += k * shape[0, i] * shape[0, j]
+                add_part(a, b, piece, k, c, power, coef, nodes, quad, shape, matrices[piece])
+    add_tip_spring(course, nodes, coef, switches, numbers, shape, matrices)
+
+
+@inner
+def add_tip_spring(course, nodes, coef, switches, numbers, shape, matrices):
+    """Add a spring at the tip to the tissue's matrix of its block."""
+    if numbers[ix.TIP_STIFFNESS] == 0.0:
+        return
+    tip = tip_place(course[ix.DEPTH], switches[ix.FRAME], numbers[ix.LENGTH])
+    piece, k = locate(nodes, tip), numbers[ix.TIP_STIFFNESS] / course[ix.STRETCH]  # the spring itself is not stretched
+    values_at(coef, nodes, piece, tip, shape)
+    block = piece if switches[ix.STRIDE] else 0
+    for i in range(coef.shape[1]):
+        for j in range(coef.shape[1]):
+            matrices[block, ix.TISSUE, i, j] += k * shape[0, i] * shape[0, j]
 
 
 @inner
@@ -175,38 +208,51 @@ def cover_elements(course, nodes, coef, quad, units, switches, numbers, layers, 
 
 
 @inner
-def add_sums(first, last, factor, sums, kind, matrix):
-    """Add the integrals of whole pieces, first <= piece < last, from the sums up to each node (P + 1, 4, m, m)."""
+def add_sums(piece, factor, sums, kind, matrix):
+    """Add the integrals of all pieces before one, from the sums up to each node (P + 1, 4, m, m)."""
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[1]):
-            matrix[i, j] += factor * (sums[last, kind, i, j] - sums[first, kind, i, j])
+            matrix[i, j] += factor * sums[piece, kind, i, j]
+
+
+@inner
+def add_up_to(x, k, c, frame, nodes, coef, quad, sums, shape, matrices):
+    """Add k and c times the integrals from the start of the line to a place to the tissue matrices (4, n, n)."""
+    piece = locate(nodes, x)
+    if x >= nodes[piece + 1]:
+        piece += 1
+    add_sums(piece, k, sums, ix.UNIT_MASS, matrices[ix.TISSUE])
+    if c != 0.0:
+        add_sums(piece, c, sums, ix.UNIT_MASS, matrices[ix.DAMPING])
+        add_sums(piece, c, sums, ix.UNIT_DRAG, matrices[ix.DRAG])
+        add_sums(piece, c, sums, ix.UNIT_SLIP, matrices[ix.SLIP])
+    if x > nodes[piece]:
+        add_part(nodes[piece], x, piece, k, c, 1 if frame == ix.STRETCHED else 0, coef, nodes, quad, shape, matrices)
 
 
 @inner
 def cover_functions(course, nodes, coef, quad, sums, switches, numbers, layers, matrices, covered, shape, changed):
-    """Form the tissue matrices (1, 4, n, n) of functions that live on all pieces."""
-    frame, pieces = switches[ix.FRAME], len(nodes) - 1
+    """Form the tissue matrices (1, 4, n, n) of functions that live on all pieces: what k and c jump by at each end of a layer."""
+    frame = switches[ix.FRAME]
     if covered[0, 0] == course[ix.DEPTH] and covered[0, 1] == course[ix.SIDE]:
         return
     changed[0] = 1
     covered[0, 0], covered[0, 1] = course[ix.DEPTH], course[ix.SIDE]
     matrices[0, :, :, :] = 0.0
+    behind, k, c = 0.0, 0.0, 0.0  # the end of the layer before
     for number in range(layers.shape[0]):
         layer = layers[number]
         if not course[ix.SIDE] > layer[ix.LAYER_START]:
             continue
         start, end = layer_ends(layer, course, frame, numbers[ix.LENGTH])
-        first, last = locate(nodes, start), locate(nodes, end)
-        first += 1 if nodes[first] < start else 0
-        last += 1 if last + 1 == pieces and nodes[pieces] <= end else 0
-        if last > first:
-            c = layer[ix.VISCOSITY] * switches[ix.VISCOUS]
-            add_sums(first, last, layer[ix.MODULUS], sums, ix.UNIT_MASS, matrices[0, ix.TISSUE])
-            if c != 0.0:
-                add_sums(first, last, c, sums, ix.UNIT_MASS, matrices[0, ix.DAMPING])
-                add_sums(first, last, c, sums, ix.UNIT_DRAG, matrices[0, ix.DRAG])
-                add_sums(first, last, c, sums, ix.UNIT_SLIP, matrices[0, ix.SLIP])
-    add_parts(course, nodes, coef, quad, switches, numbers, layers, shape, matrices)
+        if behind != start:
+            add_up_to(behind, k, c, frame, nodes, coef, quad, sums, shape, matrices[0])
+            k, c = 0.0, 0.0
+        next_k, next_c = layer[ix.MODULUS], layer[ix.VISCOSITY] * switches[ix.VISCOUS]
+        add_up_to(start, k - next_k, c - next_c, frame, nodes, coef, quad, sums, shape, matrices[0])
+        behind, k, c = end, next_k, next_c
+    add_up_to(behind, k, c, frame, nodes, coef, quad, sums, shape, matrices[0])
+    add_tip_spring(course, nodes, coef, switches, numbers, shape, matrices)
     if frame == ix.FIXED:  # its shapes rest with the tissue
         matrices[0, ix.DRAG :, :, :] = 0.0
 
@@ -217,10 +263,10 @@ def grow(course, nodes, coef, quad, sums, switches, numbers, shape, matrices):
     depth, rho, bending = course[ix.DEPTH], numbers[ix.MASS_PER_LENGTH], numbers[ix.BENDING_STIFFNESS]
     piece, convected = locate(nodes, depth), 1.0 if switches[ix.CONVECTED] else 0.0
     matrices[:, :, :] = 0.0
-    add_sums(0, piece, rho, sums, ix.UNIT_MASS, matrices[ix.MASS])
-    add_sums(0, piece, bending, sums, ix.UNIT_BENDING, matrices[ix.BENDING])
-    add_sums(0, piece, rho * convected, sums, ix.UNIT_DRAG, matrices[ix.CONVECTION])
-    add_sums(0, piece, rho * convected, sums, ix.UNIT_SLIP, matrices[ix.CENTRIFUGAL])
+    add_sums(piece, rho, sums, ix.UNIT_MASS, matrices[ix.MASS])
+    add_sums(piece, bending, sums, ix.UNIT_BENDING, matrices[ix.BENDING])
+    add_sums(piece, rho * convected, sums, ix.UNIT_DRAG, matrices[ix.CONVECTION])
+    add_sums(piece, rho * convected, sums, ix.UNIT_SLIP, matrices[ix.CENTRIFUGAL])
     size, m = depth - nodes[piece], coef.shape[1]
     for point in range(quad.shape[1]):
         weight = size * quad[1, point]

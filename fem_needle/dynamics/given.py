@@ -1,7 +1,7 @@
 """Models that the kernel asks for their matrices at every depth: they keep their own form (docs/decisions/0023-one-kernel.md).
 
-Modes of the full length that are told apart only in some directions, equations with mistakes in them, columns that move with the
-depth, models of another package: everything that meets `fem_needle.plant.Plant`.
+Equations with mistakes in them, columns that move with the depth, models of another package: everything that meets
+`fem_needle.plant.Plant`.
 """
 
 from __future__ import annotations

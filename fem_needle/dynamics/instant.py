@@ -10,6 +10,7 @@ from fem_needle.dynamics.callback import ask
 from fem_needle.dynamics.compilation import inner
 from fem_needle.dynamics.cover import cover_elements, cover_functions, grow
 from fem_needle.dynamics.points import set_points
+from fem_needle.dynamics.resolve import resolve
 from fem_needle.dynamics.signals import curvature_of, rate_of, row_at, value_of
 
 
@@ -98,6 +99,8 @@ def prepare_matrices(arrays, at, changed):
     sums = floats_4(arrays, ix.UNIT_SUMS)
     if switches[ix.FRAME] == ix.FIXED and not (covered[0, 0] == course[ix.DEPTH] and covered[0, 1] == course[ix.SIDE]):
         grow(course, nodes, coef, quad, sums, switches, numbers, shape, floats_5(arrays, ix.BEAM)[at, 0])
+        if switches[ix.RESOLVES]:
+            resolve(arrays, at)
     cover_functions(course, nodes, coef, quad, sums, switches, numbers, layers, tissue, covered, shape, changed)
 
 

@@ -7,16 +7,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import comb
-from typing import Any, TypeGuard
+from typing import Any, Protocol, TypeGuard
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.beam_needle import BeamNeedle, points_of
+from fem_needle.beam_needle import points_of
 from fem_needle.dynamics import names as at
 from fem_needle.dynamics.drive import bevel_of
-from fem_needle.frames import MaterialFrame, StretchedFrame
+from fem_needle.foundation import Foundation
+from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
 from fem_needle.gauss import gauss_rule
 from fem_needle.piecewise import PiecewisePolynomials
 from fem_needle.plant import SMALLEST_COMPLIANCE, Plant
@@ -52,16 +53,38 @@ class Model:
         return self.arrays[at.SWITCH]
 
 
+class PolynomialNeedle(Plant, Protocol):
+    """A plant on polynomials, all of whose matrices follow from them (`Plant.is_polynomial`).
+
+    Attributes
+    ----------
+    shapes, frame
+        The functions w is made of, and where a position along the insertion axis lies on them.
+    foundation
+        Tells whether any tissue is viscous.
+    turns
+        Whether the hub's rotation is a coordinate.
+    nearly_dependent
+        Whether only some directions of the functions are told apart at a small depth.
+    """
+
+    shapes: Any
+    frame: Frame
+    foundation: Foundation
+    turns: bool
+    nearly_dependent: bool
+
+
 # Made once for each needle; gone with it.
-_CONSTANTS: WeakKeyDictionary[BeamNeedle, dict[int, NDArray[Any]]] = WeakKeyDictionary()
+_CONSTANTS: WeakKeyDictionary[PolynomialNeedle, dict[int, NDArray[Any]]] = WeakKeyDictionary()
 
 
-def is_known(plant: Plant) -> TypeGuard[BeamNeedle]:
+def is_known(plant: Plant) -> TypeGuard[PolynomialNeedle]:
     """Return whether a plant's shapes are polynomials that say all of it: else the kernel asks it for its matrices."""
-    return isinstance(plant, BeamNeedle) and plant.is_polynomial
+    return plant.is_polynomial
 
 
-def model_of(plant: BeamNeedle, *, inertia: bool, viscous: bool = True) -> Model:
+def model_of(plant: PolynomialNeedle, *, inertia: bool, viscous: bool = True) -> Model:
     """Return the arrays of a needle; without viscosity, or without inertia, where these are left out."""
     if plant not in _CONSTANTS:
         _CONSTANTS[plant] = _constant_arrays(plant)
@@ -71,7 +94,7 @@ def model_of(plant: BeamNeedle, *, inertia: bool, viscous: bool = True) -> Model
     return Model(plant.size, int(switches[at.POINTS]), arrays | {at.SWITCH: switches})
 
 
-def _constant_arrays(plant: BeamNeedle) -> dict[int, NDArray[Any]]:
+def _constant_arrays(plant: PolynomialNeedle) -> dict[int, NDArray[Any]]:
     """Return the arrays of a needle that nothing writes to: all its engines may share them."""
     scene, polynomials = plant.scene, plant.shapes.polynomials()
     frame = _frame_of(plant)
@@ -104,13 +127,13 @@ def _constant_arrays(plant: BeamNeedle) -> dict[int, NDArray[Any]]:
     return {name: np.ascontiguousarray(array) for name, array in arrays.items()}
 
 
-def _frame_of(plant: BeamNeedle) -> int:
+def _frame_of(plant: PolynomialNeedle) -> int:
     if isinstance(plant.frame, MaterialFrame):
         return at.MATERIAL
     return at.STRETCHED if isinstance(plant.frame, StretchedFrame) else at.FIXED
 
 
-def _switches(plant: BeamNeedle, polynomials: PiecewisePolynomials, frame: int) -> Integers:
+def _switches(plant: PolynomialNeedle, polynomials: PiecewisePolynomials, frame: int) -> Integers:
     scene, found = plant.scene, np.zeros(at.SWITCHES, dtype=np.int64)
     found[at.FRAME], found[at.PRESCRIBED] = frame, plant.prescribed
     found[at.GUIDES] = len(scene.support.guides)
@@ -121,6 +144,7 @@ def _switches(plant: BeamNeedle, polynomials: PiecewisePolynomials, frame: int) 
     found[at.CONVECTED] = frame == at.STRETCHED or (frame == at.FIXED and scene.model.kinematics == "material")
     found[at.CUTS] = scene.tissue.rest_line == "cut-path"
     found[at.TURNS], found[at.AXIAL_ACTS] = plant.turns, plant.axial_force_acts
+    found[at.RESOLVES] = plant.nearly_dependent
     return found
 
 
@@ -172,7 +196,7 @@ def _unit_integrals(shapes: Shapes, polynomials: PiecewisePolynomials, power: in
     return result
 
 
-def _beam_matrices(plant: BeamNeedle, polynomials: PiecewisePolynomials, units: Array, frame: int) -> Array:
+def _beam_matrices(plant: PolynomialNeedle, polynomials: PiecewisePolynomials, units: Array, frame: int) -> Array:
     """Return M, K, S, R of every block, for a stretch of 1; of a beam that grows, room for those of each instant."""
     scene, needle = plant.scene, plant.scene.needle
     m = polynomials.coefficients.shape[1]

@@ -30,7 +30,7 @@ MATERIAL, STRETCHED, FIXED = range(3)
     AXIAL_ACTS,
     PRINTED,
     GIVEN,
-    RANK,
+    RESOLVES,
 ) = range(16)
 SWITCHES = 16
 
@@ -222,7 +222,7 @@ LATERAL, AXIAL_STATE, LEDGER_STATE, HELD, PATH_EDGES, PATH_CUBICS, PATH_MOMENTS,
 ) = range(50, 83)
 # A call.
 INTERVALS, CURSOR, LIMITS, RECORDS = range(83, 87)
-# A model that is asked: its address, numbers and loads that it answers, directions that it resolves and how many, and work space.
+# A model that is asked: its address, what it answers. Directions that a model resolves, how many, and work space.
 ASKED, ANSWERED, ANSWERED_LOAD, SUBSPACE, RANKS, REDUCED, REDUCED_VALUES, REDUCED_WORK = range(87, 95)
 ARRAYS = 95
 

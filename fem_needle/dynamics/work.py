@@ -111,7 +111,7 @@ def _space(model: Model, width: int) -> dict[int, NDArray[Any]]:
     }  # fmt: skip
     found: dict[int, NDArray[Any]] = {name: np.zeros(shape) for name, shape in shapes.items()}
     found[at.KEY] = np.full(7, np.nan)
-    given = n if model.switches[at.GIVEN] else 1
+    given = n if model.switches[at.GIVEN] or model.switches[at.RESOLVES] else 1
     found |= {
         at.ASKED: np.zeros(1, dtype=np.int64), at.ANSWERED: np.zeros(4), at.ANSWERED_LOAD: np.zeros((2, given)),
         at.SUBSPACE: np.zeros((at.INSTANTS, given, given)), at.RANKS: np.zeros(at.INSTANTS, dtype=np.int64),

@@ -1,0 +1,48 @@
+"""Models that the kernel knows against the same models that it asks for their matrices: nearly dependent modes, fixed columns."""
+
+import numpy as np
+import pytest
+
+from fem_needle import FiniteElementNeedle, simulate
+from fem_needle.scene import TipLoad
+from reduced_model import AssumedModeNeedle, mode_basis, project
+from tests.consistency.scenes import BUZZ, LAYERS, held, moving, scene_of
+
+CASES = {
+    "moving": (scene_of("entry", moving(0.5, 0.04, 0.14), loads=(TipLoad(force=BUZZ),), duration=0.2), "dynamic"),
+    "held": (scene_of("entry", held(0.12), layers=LAYERS, loads=(TipLoad(force=0.1),), duration=0.05), "dynamic"),
+    "at rest": (scene_of("entry", moving(0.01, 0.02, 0.14), layers=LAYERS, loads=(TipLoad(force=0.1),)), "static"),
+}
+
+
+@pytest.mark.parametrize("modes", [3, 5, 8])
+@pytest.mark.parametrize("name", CASES)
+def test_the_kernel_finds_the_directions_itself(name, modes):
+    scene, analysis = CASES[name]
+    settings = {"time_step": 1e-3, "output_step": 1e-2} if analysis == "dynamic" else {"output_step": 1.0}
+    runs = []
+    for is_polynomial in (True, False):
+        plant = AssumedModeNeedle(scene, modes=modes, basis="full-length")
+        plant.is_polynomial = is_polynomial
+        runs.append(simulate(plant, analysis=analysis, **settings))
+    compiled, asked = runs
+    largest = np.max(np.abs(asked.tip_deflection))
+    assert largest > 1e-5
+    assert np.max(np.abs(compiled.tip_deflection - asked.tip_deflection)) < 1e-8 * largest
+    for energy in ("bending_energy", "tissue_energy"):
+        most = np.max(np.abs(asked.series[energy]))
+        assert np.max(np.abs(compiled.series[energy] - asked.series[energy])) < 1e-6 * most
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_columns_that_stay_are_not_asked_for(name):
+    scene, analysis = CASES[name]
+    settings = {"time_step": 1e-3, "output_step": 1e-2} if analysis == "dynamic" else {"output_step": 1.0}
+    needle, runs = FiniteElementNeedle(scene, elements=6), []
+    for is_polynomial in (True, False):
+        plant = project(needle, mode_basis(needle, 3, "inserted-length"))
+        assert plant.is_polynomial
+        plant.is_polynomial = is_polynomial
+        runs.append(simulate(plant, analysis=analysis, **settings))
+    compiled, asked = runs
+    assert np.max(np.abs(compiled.tip_deflection - asked.tip_deflection)) < 1e-9 * np.max(np.abs(asked.tip_deflection))
