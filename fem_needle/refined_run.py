@@ -16,7 +16,7 @@ from fem_needle.detuning import detuning
 from fem_needle.dynamics.grid import RunEnd, TimeGrid, time_grid
 from fem_needle.errors import ComputationError
 from fem_needle.expectation import Expectation, expectation
-from fem_needle.run_job import Job, begin, collect, shown, total_error, trajectory_of
+from fem_needle.run_job import Course, Job, begin, collect, shown, total_error, trajectory_of
 from fem_needle.sample_arrays import Samples, joined, tips_of
 from fem_needle.trajectory import Trajectory, guide_advice
 from fem_needle.trial_steps import coarsest_step, is_passing, is_undamped, resolving_step, sampled_grid, shares_of
@@ -296,11 +296,10 @@ def _show(search: _Search) -> Trajectory:
     """Show the last run to the observer and return it."""
     trial, job = search.trials[-1], search.trials[-1].job
     grid = time_grid(job.plant, trial.step, job.choice.output_step)
-    wanted = np.isin(trial.samples.time, grid.outputs)
-    wanted[-1] = True
-    samples = trial.samples.rows(wanted)
+    course = Course(job.choice, trial.grid, grid.outputs)
+    samples = course.shown(trial.samples)
     begin(job, grid)
-    run = trajectory_of(job, grid, samples, None, trial.end)
+    run = replace(trajectory_of(job, grid, samples, None, trial.end), course=course)
     if search.error is not None:
         run.summary["error_estimate"] = total_error(search.job, search.error)
     if search.error is not None and search.error > search.allowed:

@@ -6,6 +6,8 @@ import time as clock
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
+import numpy as np
+
 from fem_needle.choices import Choice
 from fem_needle.collocation import collocation
 from fem_needle.dynamics.engine import DYNAMIC
@@ -49,6 +51,31 @@ class Job:
         return self.chosen.plant
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """In which steps a run was taken: another plant may take the same.
+
+    Attributes
+    ----------
+    choice
+        Analysis and parts of the run.
+    grid
+        Steps, and instants at which they are sampled.
+    outputs
+        Those that are shown.
+    """
+
+    choice: Choice
+    grid: TimeGrid
+    outputs: tuple[float, ...]
+
+    def shown(self, samples: Samples) -> Samples:
+        """Return the samples that are shown, and the last one."""
+        wanted = np.isin(samples.time, self.outputs)
+        wanted[-1] = True
+        return samples.rows(wanted)
+
+
 class Nobody:
     """Watches nothing."""
 
@@ -68,7 +95,35 @@ def run_live(job: Job, time_step: float, time_error: float | None) -> Trajectory
     begin(job, grid)
     blocks: list[Samples] = []
     end = collect(job, grid, blocks, live=True)
-    return trajectory_of(job, grid, joined(blocks), time_error, end)
+    run = trajectory_of(job, grid, joined(blocks), time_error, end)
+    return replace(run, course=Course(job.choice, grid, grid.outputs))
+
+
+def run_along(plant: Plant, course: Course, scene: Scene) -> tuple[Trajectory, str]:
+    """Run a plant in the steps of another run.
+
+    Returns
+    -------
+    tuple
+        The run, whose ``solve_time`` is that of the steps alone, and why it stopped before its end; empty where it did not.
+
+    Raises
+    ------
+    ComputationError
+        If it fails before its first sample.
+    """
+    job = Job(ChosenPlant(plant, None), scene, course.choice, Nobody(), clock.perf_counter())
+    blocks, failure = list[Samples](), ""
+    try:
+        end = collect(job, course.grid, blocks, live=False)
+    except ComputationError as error:
+        if not blocks:
+            raise
+        end, failure = RunEnd("failed", course.grid.steps), str(error)
+    seconds = clock.perf_counter() - job.started
+    run = trajectory_of(job, course.grid, course.shown(joined(blocks)), None, end)
+    run.summary["solve_time"] = seconds
+    return run, failure
 
 
 def shown(job: Job, run: Trajectory, samples: Samples) -> Trajectory:

@@ -88,6 +88,8 @@ class Trajectory(Shown):
         What ``summary.json`` holds.
     plant, coordinates, point_forces
         The model and its state at each sample; None in a run that was loaded.
+    course
+        In which steps it was taken (`fem_needle.run_job.Course`); None of a loop or a run that was loaded.
     """
 
     scene: Scene
@@ -103,6 +105,7 @@ class Trajectory(Shown):
     plant: Plant | None = None
     coordinates: Array | None = None
     point_forces: Array | None = None
+    course: Any = None
 
     def __getattr__(self, name: str) -> Array:
         if name in VARIABLES and "series" in self.__dict__:

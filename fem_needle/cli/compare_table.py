@@ -143,6 +143,17 @@ def _cost(comparison: Comparison) -> Iterator[Row]:
         yield f"time of {len(truth.curve.depths)} equilibria [s]", *_times(seconds)
     if truth.run is not None:
         yield "time of the run [s]", *_times([answer.run.solve_time for answer in comparison.answers if answer.run is not None])
+    if any(model.equal is not None for model in comparison.models):
+        yield _errors(comparison, "cheapest elements as right", _equal)
+
+
+def _equal(model: ComparedModel) -> str:
+    """Return the elements that are as right as a model, and what the model costs beside them."""
+    if model.equal is None:
+        return "none"
+    count, factor = model.equal.elements, model.equal.factor
+    noun = "element" if count == 1 else "elements"
+    return f"{count} {noun} ({_percent(model.equal.tip_error)}): the modes take {factor:.2g} x their time"
 
 
 def _times(seconds: list[float]) -> Iterator[str]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.comparison.at_rest import FREQUENCIES, RestStates, StaticErrors, StaticLoad
+from fem_needle.comparison.equals import EqualElements
 from fem_needle.comparison.ranges import Interval
 from fem_needle.comparison.runs import ENERGIES, RunErrors, TimedRun, shape_at
 from fem_needle.display import Card, Shown, in_millimeters, text
@@ -67,6 +68,8 @@ class ComparedModel:
         Differences over the run; None where nothing moves.
     covers
         Whether the run was compared to its end, or nearly; True where there is none.
+    equal
+        The cheapest elements whose tip is as right, in the run, or at rest where nothing moves; None where there are none.
     """
 
     answer: ModelAnswer
@@ -75,6 +78,7 @@ class ComparedModel:
     ranges: tuple[Interval, ...]
     run: RunErrors | None
     covers: bool
+    equal: EqualElements | None = None
 
     @property
     def largest_tip_error(self) -> float:
@@ -291,6 +295,7 @@ def _differences(model: ComparedModel, reference: ModelAnswer) -> dict[str, Any]
         "largest_errors_at_rest": None if curve is None else largest_errors(curve),
         "run_errors": None,
         "speed_up": speed_ups(model.answer, reference),
+        "equal_elements": None if model.equal is None else asdict(model.equal) | {"factor": model.equal.factor},
     }
     if run is not None:
         result["run_errors"] = {

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time as clock
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from fem_needle.comparison.at_rest import shape_stations
 from fem_needle.errors import ComputationError
 from fem_needle.plant import Plant
-from fem_needle.sample_arrays import Samples
+from fem_needle.run_job import run_along
 from fem_needle.simulation import simulate
 from fem_needle.trajectory import Trajectory
 
@@ -32,7 +31,7 @@ class TimedRun:
     run
         The trajectory; of a failed run, what was computed before.
     solve_time
-        Of the steps, from the first sample to the last [s]; of a step that was chosen, of its last run alone.
+        Of the steps, from the first sample to the last [s]; trial runs are left out.
     failure
         Why it stopped before its end; empty where it did not.
     """
@@ -82,38 +81,8 @@ class RunErrors:
         return bool(self.time[-1] >= COVERED * reference.run.time[-1])
 
 
-class _Stopwatch:
-    """Watches a run and forgets all but its last refinement."""
-
-    def __init__(self) -> None:
-        self.started = self.ended = clock.perf_counter()
-        self._fraction = 0.0
-
-    def begin(self, plant: Plant, choice: dict[str, Any]) -> None:
-        """Ignore."""
-
-    def progress(self, fraction: float) -> None:
-        """Start again where a run does."""
-        now = clock.perf_counter()
-        if fraction <= self._fraction:
-            self.started = now
-        self._fraction, self.ended = fraction, now
-
-    def samples(self, block: Samples) -> None:
-        """Ignore."""
-
-
-def timed_run(plant: Plant, *, may_fail: bool = False, **settings: Any) -> TimedRun:
-    """Run a plant through its scene.
-
-    Parameters
-    ----------
-    plant
-        The model.
-    may_fail
-        Whether a run that fails on its way is an answer: what it computed.
-    settings
-        Of `fem_needle.simulate`.
+def reference_run(plant: Plant, **settings: Any) -> TimedRun:
+    """Run the reference through its scene with settings of `fem_needle.simulate`, and once more to see what its steps take.
 
     Raises
     ------
@@ -122,16 +91,26 @@ def timed_run(plant: Plant, *, may_fail: bool = False, **settings: Any) -> Timed
     KeyboardInterrupt
         Also where the run itself would end in order: half a run must not pass for one.
     """
-    watch = _Stopwatch()
-    try:
-        run, failure = simulate(plant, observer=watch, **settings), ""
-    except ComputationError as error:
-        if not may_fail or error.partial is None:
-            raise
-        run, failure = error.partial, str(error)
+    run = simulate(plant, **settings)
     if run.summary["stop_reason"] == "interrupted":
         raise KeyboardInterrupt
-    return TimedRun(run, watch.ended - watch.started, failure)
+    return replace(model_run(plant, run), run=run)
+
+
+def model_run(plant: Plant, reference: Trajectory) -> TimedRun:
+    """Run a plant in the steps of the reference; a run that fails on its way is an answer: what it computed.
+
+    Raises
+    ------
+    ComputationError
+        If the run fails before its first sample.
+    KeyboardInterrupt
+        Also where the run itself would end in order.
+    """
+    run, failure = run_along(plant, reference.course, plant.scene)
+    if run.summary["stop_reason"] == "interrupted":
+        raise KeyboardInterrupt
+    return TimedRun(run, run.summary["solve_time"], failure)
 
 
 def run_errors(found: TimedRun, reference: TimedRun) -> RunErrors:

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from fem_needle.choices import choose
 from fem_needle.comparison.at_rest import StaticLoad, compared_depths, rest_states, static_errors, static_load
+from fem_needle.comparison.equals import equal_at_rest, equal_in_run
 from fem_needle.comparison.ranges import Interval, described, intervals_within
 from fem_needle.comparison.result import ComparedModel, Comparison, ModelAnswer
-from fem_needle.comparison.runs import TimedRun, run_errors, timed_run
+from fem_needle.comparison.runs import model_run, reference_run, run_errors
 from fem_needle.errors import SceneError
 from fem_needle.linear.linearization import reach
 from fem_needle.loads import is_steady
@@ -49,11 +50,11 @@ class _Setting:
     depths: tuple[float, ...]
     moves: bool
 
-    def steps(self, reference: TimedRun | None) -> dict[str, Any]:
-        """Return the settings of a run: of the reference's own, or those that it has run with."""
-        common: dict[str, Any] = {"analysis": self.analysis, "tolerance": self.scene.numerics.tolerance}
-        common["output_step"] = self.scene.numerics.output_step
-        return common | ({} if reference is None else {"time_step": reference.run.summary["time_step"]})
+    @property
+    def steps(self) -> dict[str, Any]:
+        """Settings of the reference's run."""
+        numerics = self.scene.numerics
+        return {"analysis": self.analysis, "tolerance": numerics.tolerance, "output_step": numerics.output_step}
 
 
 @one_thread
@@ -112,7 +113,8 @@ def compare(
     plants = [build_plant(one.with_values(_held(true_scene))) for one in scenes]  # all of them, before anything is computed
     _refuse_equal(plants)
     truth, true_plant = _answer(setting, build_plant(true_scene), None)
-    compared = tuple(_compared(setting, plant, truth, true_plant, within) for plant in plants)
+    found = (_compared(setting, plant, truth, true_plant, within) for plant in plants)
+    compared = tuple(_beside_elements(setting, plant, truth, model) for plant, model in zip(plants, found, strict=True))
     return Comparison(
         scene=scene,
         reference=truth,
@@ -203,7 +205,8 @@ def _answer(setting: _Setting, plant: Plant, truth: ModelAnswer | None) -> tuple
         chosen = rest_states(still, setting.depths, setting.load.time)
         curve = rest_states(still, setting.curve_depths, setting.load.time)
     if setting.moves:
-        run = timed_run(plant, may_fail=truth is not None, **setting.steps(None if truth is None else truth.run))
+        known = None if truth is None else truth.run
+        run = reference_run(plant, **setting.steps) if known is None else model_run(plant, known.run)
     warnings = tuple(run.run.summary["warnings"]) if run is not None else plant.warnings
     description = dict(plant.describe())
     answer = ModelAnswer(
@@ -243,6 +246,16 @@ def _compared(setting: _Setting, model: Plant, truth: ModelAnswer, true_plant: P
         )
         answer = replace(answer, warnings=(*answer.warnings, text))
     return ComparedModel(answer, chosen, curve, ranges, run, covers)
+
+
+def _beside_elements(setting: _Setting, plant: Plant, truth: ModelAnswer, model: ComparedModel) -> ComparedModel:
+    """Return a model with the cheapest elements that are as right."""
+    error, equal = model.largest_tip_error, None
+    if truth.run is not None:
+        equal = equal_in_run(setting.scene, plant, error, truth.run)
+    elif truth.curve is not None:
+        equal = equal_at_rest(setting.scene, plant, error, truth.curve, setting.load)
+    return replace(model, equal=equal)
 
 
 def _ranges(setting: _Setting, true_plant: Plant, plant: Plant, within: float) -> tuple[Interval, ...]:

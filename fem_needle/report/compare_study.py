@@ -66,6 +66,10 @@ def _figures(reference: dict[str, Any], models: list[dict[str, Any]]) -> Grid:
         rows.append((f"{key.replace('_', ' ')} error in the run", "", *(_nested(one, "run_errors", key) for one in models)))
     for key, name in (("static", "at rest"), ("run", "of the run")):
         rows.append((f"speed-up {name}", "1", *(number((one.get("speed_up") or {}).get(key), 2) for one in models)))
+    equals = [one.get("equal_elements") or {} for one in models]
+    if any(equals):
+        rows.append(("cheapest elements as right", "", *(str(one.get("elements", "none")) for one in equals)))
+        rows.append(("time beside theirs", "", *(number(one.get("factor"), 2) for one in equals)))
     headers = ("", *(str(one["label"]) for one in (reference, *models)))
     return Grid("Largest errors and cost", headers, tuple(rows))
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem_needle import FiniteElementNeedle
-from fem_needle.comparison.runs import RunErrors, run_errors, timed_run
+from fem_needle.comparison.runs import RunErrors, model_run, reference_run, run_errors
 from fem_needle.inertia_effect import inertia_effect
 from fem_needle.scene import Scene
 from reduced_model.validation.cases import (
@@ -67,9 +67,9 @@ def insertions(case: str, speed: float) -> Insertions:
     scene = insertion_scene(case, speed)
     settings = STEPS[speed]
     elements = FiniteElementNeedle(scene, elements=ELEMENTS)
-    reference = timed_run(elements, **settings)
+    reference = reference_run(elements, **settings)
     chosen = [choice for choice in CHOICES if _differs(choice, scene)]
-    errors = {choice.label: run_errors(timed_run(choice.plant(scene), **settings), reference) for choice in chosen}
+    errors = {choice.label: run_errors(model_run(choice.plant(scene), reference.run), reference) for choice in chosen}
     return Insertions(case, speed, errors, inertia_effect(elements))
 
 

@@ -9,6 +9,7 @@ from fem_needle import ComputationError, FiniteElementNeedle, SceneError, load_s
 from fem_needle.cli.compare_table import EARLY, _depths, _in_the_run, _numbers
 from fem_needle.comparison import runs
 from fem_needle.comparison.at_rest import compared_depths, relative_difference
+from fem_needle.comparison.equals import COUNTS
 from fem_needle.comparison.ranges import Interval, described, intervals_within
 from fem_needle.comparison.study import compare
 from fem_needle.models import build_plant
@@ -144,23 +145,25 @@ def test_the_printed_equations_are_compared_in_the_run_alone():
 
 
 def test_a_run_that_fails_is_infinitely_wrong(monkeypatch):
-    real, calls = runs.simulate, []
+    real, calls = runs.run_along, []
 
-    def failing(plant, **settings):
-        run = real(plant, **settings)
+    def failing(plant, course, scene):
+        run, failure = real(plant, course, scene)
         calls.append(plant)
-        if len(calls) < 2:
-            return run
-        error = ComputationError("the second run fails")
-        error.partial = run
-        raise error
+        return (run, failure) if len(calls) < 2 else (run, "the second run fails")
 
-    monkeypatch.setattr(runs, "simulate", failing)
+    monkeypatch.setattr(runs, "run_along", failing)
     found = compare(load_scene("thesis").with_values(SHORT), elements=4)
     assert found.models[0].largest_tip_error == np.inf
     assert found.models[0].answer.warnings[-1] == "the second run fails"
-    calls.append(None)
-    with pytest.raises(ComputationError, match="second"):
+
+
+def test_a_reference_that_fails_is_an_error(monkeypatch):
+    def failing(plant, **settings):
+        raise ComputationError("the reference fails")
+
+    monkeypatch.setattr(runs, "simulate", failing)
+    with pytest.raises(ComputationError, match="reference"):
         compare(load_scene("thesis").with_values(SHORT), elements=4)
 
 
@@ -254,3 +257,26 @@ def test_ranges_are_shown_by_layer_and_joined_over_the_depth():
     assert _numbers(parts) == "0.100 to 0.200 (fat), 0.300 to 0.400 (gland), 0.600 to 0.700 (gland)"
     assert _numbers(parts[2:]) == "0.300 to 0.400, 0.600 to 0.700"
     assert (_numbers(parts[:1]), _numbers(()), _depths(())) == ("in no layer", "nowhere", "nowhere")
+
+
+def test_models_run_in_the_steps_of_the_reference():
+    """Steps over vibrations are graded behind kinks: equal ones of the same length would cost several percent of the tip."""
+    found = compare(load_scene("three-layers"), modes=[2], elements=6)
+    times = [answer.run.run.time for answer in found.answers]
+    assert np.array_equal(times[0], times[1])
+    assert found.answers[1].run.run.summary["steps"] == found.reference.run.run.summary["steps"]
+
+
+def test_the_cheapest_elements_as_right_stand_beside_a_model():
+    found = compare(load_scene("thesis").with_values(SHORT), modes=[5], elements=8).models[0]
+    assert 1 < found.equal.elements < 8
+    assert found.equal.tip_error <= found.largest_tip_error
+    assert found.equal.factor == pytest.approx(found.equal.model_time / found.equal.solve_time)
+    fewer = [count for count in COUNTS if count < found.equal.elements]
+    assert all(_error_of(count) > found.largest_tip_error for count in fewer)
+
+
+def _error_of(count):
+    scene = load_scene("thesis").with_values(SHORT)
+    true, run = (run_scene(scene, elements=elements, analysis="quasi-static") for elements in (8, count))
+    return np.max(np.abs(run.tip_deflection - true.tip_deflection)) / np.max(np.abs(true.tip_deflection))
