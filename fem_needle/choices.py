@@ -103,7 +103,7 @@ def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
 
 def _may_pass_over(scene: Scene) -> bool:
     """Return whether steps and their method are free, and there is something that damps vibrations."""
-    is_free = _chooses_steps(scene) and "spectral_radius" not in scene.numerics.model_fields_set
+    is_free = _chooses_steps(scene) and scene.numerics.spectral_radius == "auto"
     return is_free and any(layer.damping > 0.0 for layer in scene.tissue.layers)
 
 

@@ -163,13 +163,14 @@ def may_move(scene: Scene) -> bool:
 
 
 def wanted_radius(scene: Scene) -> float:
-    """Return the integrator's spectral radius: the scene's; where it names none, 0 for a needle that slides in rigid guides.
+    """Return the integrator's spectral radius: the scene's; "auto": 1, but 0 of a needle that slides in rigid guides.
 
     They are index-3 constraints that move through the mesh: what one step misses of them, an undamped method keeps for ever.
     """
-    numerics, guides = scene.numerics, scene.support.guides
-    slides = may_move(scene) and any(guide.stiffness == "rigid" for guide in guides)
-    return SLIDING_RADIUS if slides and "spectral_radius" not in numerics.model_fields_set else numerics.spectral_radius
+    if isinstance(scene.numerics.spectral_radius, float):
+        return scene.numerics.spectral_radius
+    slides = may_move(scene) and any(guide.stiffness == "rigid" for guide in scene.support.guides)
+    return SLIDING_RADIUS if slides else 1.0
 
 
 def lateral_values(scene: Scene) -> list[float | Table | Sinusoid]:

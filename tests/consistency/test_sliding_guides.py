@@ -6,7 +6,7 @@ import pytest
 from fem_needle import FiniteElementNeedle, simulate
 from fem_needle.motion import wanted_radius
 from fem_needle.scene import Guide, Scene
-from tests.consistency.scenes import DAMPED, GEL, PUSH, held, profile, scene_of
+from tests.consistency.scenes import DAMPED, GEL, LAYERS, PUSH, held, moving, profile, scene_of
 from tests.references import hub_motion
 
 QUICKENS = profile([0.0, 0.05, 0.1, 0.2], [0.05, 0.051, 0.061, 0.081])  # 0.02, 0.2, 0.2 m/s: the guide passes three nodes
@@ -36,6 +36,22 @@ def test_undamped_steps_spike():
     assert spikes(sliding(GEL, numerics=UNDAMPED), 1e-3) > 0.1
 
 
+def test_two_rigid_guides_and_a_spring():
+    """Nothing damps the needle that starts straight under a turned hub; undamped steps let its push grow to 1e9 N."""
+    guides = [Guide(position=-0.01), Guide(position=-0.04), Guide(position=-0.07, stiffness=500.0)]
+    case = scene_of(
+        "hub", moving(0.01, 0.05, 0.1), LAYERS, PUSH, support={"guides": guides, "hub_angle": 0.01}, duration=None,
+        initial={"shape": "straight"},
+    )  # fmt: skip
+
+    def largest(scene: Scene) -> float:
+        run = simulate(FiniteElementNeedle(scene, elements=32), time_step=5e-4, analysis="dynamic", output_step=1e-2)
+        return float(np.max(np.abs(run.push_force[5:])))
+
+    assert largest(case) < 0.1
+    assert largest(case.with_value("numerics.spectral_radius", 1.0)) > 1.0
+
+
 def test_damped_steps_move_the_tip_as_an_independent_solver_does():
     scene = sliding(GEL)
     run = simulate(FiniteElementNeedle(scene, elements=16), time_step=2e-4, analysis="dynamic", output_step=1e-2)
@@ -48,3 +64,8 @@ def test_who_gets_damped_steps():
     soft = scene_of("hub", QUICKENS, GEL, PUSH, support={"guides": [Guide(position=-0.0317, stiffness=500.0)]})
     asked = sliding(GEL, numerics={"spectral_radius": 0.5})
     assert [wanted_radius(scene) for scene in (sliding(GEL), still, soft, asked)] == [0.0, 1.0, 1.0, 0.5]
+
+
+def test_the_complete_scene_of_a_run_repeats_it():
+    scene = sliding(GEL)
+    assert wanted_radius(Scene.from_dict(scene.to_dict(complete=True))) == wanted_radius(scene) == 0.0
