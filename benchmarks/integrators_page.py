@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from math import log
 from pathlib import Path
 from typing import Any
 
@@ -52,15 +54,20 @@ def table(header: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in (header, ["---"] * len(header), *lines)) + "\n"
 
 
-def milliseconds(text: str) -> str:
+def milliseconds(seconds: float) -> str:
     """Return a time [s] in ms with two digits."""
-    return f"{float(f'{1e3 * float(text):.2g}'):g}"
+    return f"{float(f'{1e3 * seconds:.2g}'):g}"
 
 
 def time_to(rows: Rows, error: float) -> str:
-    """Return the shortest time [ms] to an error, or nothing."""
-    good = [float(row["seconds"]) for row in rows if float(row["error"]) <= error]
-    return milliseconds(str(min(good))) if good else ""
+    """Return the time [ms] at which the error first falls to a value, between steps along a power; nothing where it does not."""
+    seconds, found = [float(row["seconds"]) for row in rows], [float(row["error"]) for row in rows]
+    if found[0] <= error:
+        return f"< {milliseconds(seconds[0])}"
+    for (before, after), (first, last) in zip(pairwise(found), pairwise(seconds), strict=True):
+        if after <= error:
+            return milliseconds(first * (last / first) ** (log(before / error) / log(before / after)))
+    return ""
 
 
 def times(rows: Rows, case: str) -> str:

@@ -71,9 +71,9 @@ class Prototype:
         self.live.lateral[0] = self._begin if begin is None else begin
         self._work[at.KEY][:] = np.nan
         self._work[at.RATES][:] = 0.0
-        began = clock.perf_counter()
+        began = clock.thread_time()
         one.take_steps(self._work.table)
-        seconds = clock.perf_counter() - began
+        seconds = clock.thread_time() - began
         return Run(found, int(np.sum(intervals[:, 2])), seconds)
 
     @property
