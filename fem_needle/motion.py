@@ -19,6 +19,7 @@ from fem_needle.segments import interfaces
 Array = NDArray[np.float64]
 
 PUSH_SLACK = 5.0
+SLIDING_RADIUS = 0.0  # spectral radius under rigid guides that a needle slides through
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,23 @@ def run_duration(scene: Scene) -> float:
     if scene.insertion.kind == "force":
         return PUSH_SLACK * time_to_depth(scene)
     return float(scene.insertion.end_time or 0.0)
+
+
+def may_move(scene: Scene) -> bool:
+    """Return whether the depth changes in a run, or may be made to: a speed of 0 may be commanded to change."""
+    lowest, highest = scene.insertion.depth_range(scene.duration)
+    return highest > lowest or scene.insertion.kind in {"force", "speed"}
+
+
+def wanted_radius(scene: Scene) -> float:
+    """Return the integrator's spectral radius: the scene's; "auto": 1, but 0 of a needle that slides in rigid guides.
+
+    They are index-3 constraints that move through the mesh: what one step misses of them, an undamped method keeps for ever.
+    """
+    if isinstance(scene.numerics.spectral_radius, float):
+        return scene.numerics.spectral_radius
+    slides = may_move(scene) and any(guide.stiffness == "rigid" for guide in scene.support.guides)
+    return SLIDING_RADIUS if slides else 1.0
 
 
 def lateral_values(scene: Scene) -> list[float | Table | Sinusoid]:

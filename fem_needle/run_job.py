@@ -16,6 +16,7 @@ from fem_needle.dynamics.parts import COSINES
 from fem_needle.dynamics.run import VIBRATION, Integration, integration_of, run_samples, spectral_radius
 from fem_needle.errors import ComputationError
 from fem_needle.models import ChosenPlant
+from fem_needle.motion import wanted_radius
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples, joined
 from fem_needle.scene import Scene
@@ -148,7 +149,7 @@ def integration(job: Job) -> Integration:
 
 def _warnings(job: Job) -> list[str]:
     found = [*job.plant.warnings, *job.chosen.warnings]
-    radius, asked = spectral_radius(job.plant, job.scene), job.scene.numerics.spectral_radius
+    radius, asked = spectral_radius(job.plant, job.scene), wanted_radius(job.scene)
     if job.choice.analysis == "dynamic" and radius < asked:
         found.append(
             f"numerics.spectral_radius = {asked:g} > {radius:g}, with which this model stays stable while it moves: "

@@ -47,7 +47,7 @@ def parts_with_inertia(scene: Scene, effect: Inertia, output_step: float) -> tup
     if not effect.responses:
         begins = "the needle is let go" if scene.initial.shape != "equilibrium" else "loads swing as fast as the needle does"
         return (Part(0.0, duration, FOLLOWED, begins),)
-    allowed, is_free = VIBRATION_SHARE * scene.numerics.tolerance, "spectral_radius" not in scene.numerics.model_fields_set
+    allowed, is_free = VIBRATION_SHARE * scene.numerics.tolerance, scene.numerics.spectral_radius == "auto"
     is_damped = any(layer.damping > 0.0 for layer in scene.tissue.layers)
     lasts = f"what lasts moves the tip by up to {effect.lasting:.1e} of its largest deflection (allowed {allowed:.1e})"
     if effect.lasting <= allowed:

@@ -11,6 +11,7 @@ import scipy  # its parts are loaded where they are used
 from numpy.typing import NDArray
 
 from fem_needle.display import Card, Shown, in_millimeters, without_rounding
+from fem_needle.motion import wanted_radius
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene, as_function
@@ -239,7 +240,7 @@ def energy_warnings(run: Trajectory) -> list[str]:
 def guide_advice(scene: Scene) -> str:
     """Return what calms rigid guides, index-3 constraints, whose forces an undamped integrator may let swing."""
     is_rigid = any(guide.stiffness == "rigid" for guide in scene.support.guides)
-    return "; spectral_radius = 0.8 calms rigid guides" if is_rigid and scene.numerics.spectral_radius == 1.0 else ""
+    return "; spectral_radius = 0.8 calms rigid guides" if is_rigid and wanted_radius(scene) == 1.0 else ""
 
 
 def summary_of(run: Trajectory) -> dict[str, Any]:

@@ -24,6 +24,7 @@ BEHIND_KINKS = 3  # outputs behind a kink at which runs with long steps are comp
 FEWEST_SAMPLES = 50  # of a finer run: instants at which runs are compared
 STEPS_PER_LOAD_PERIOD = 4  # of the coarsest trial run
 STEPS_PER_NATURAL_PERIOD = 1.5  # with which vibrations are resolved
+DAMPED_STEPS_PER_PERIOD = 24.0  # the same of a method that damps vibrations: longer steps agree that nothing vibrates
 LEAST_TURN = 2.25  # that an unresolved vibration must appear to turn over the coarsest run, in rad: differences then show it
 APPARENT = 12.0  # an unresolved vibration appears to turn by 12 / (omega h) in a step
 
@@ -59,7 +60,7 @@ def resolving_step(job: Job) -> float:
     """Return the longest step [s] that resolves the slowest vibration, infinite where none matters."""
     if job.choice.analysis != "dynamic" or job.choice.vibration <= VIBRATION_SHARE * job.scene.numerics.tolerance:
         return inf
-    return longest_period(job.plant) / STEPS_PER_NATURAL_PERIOD
+    return longest_period(job.plant) / (STEPS_PER_NATURAL_PERIOD if is_undamped(job) else DAMPED_STEPS_PER_PERIOD)
 
 
 def coarsest_step(job: Job) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from fem_needle.motion import wanted_radius
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene, TipLoad
 
@@ -81,7 +82,7 @@ def _over_time(scene: Scene, analysis: str) -> TheoreticalOrder:
     The phase of vibration N is wrong by omega^(m+1) h^m t with omega as N^2: all beyond N = h^(-m / (2 m + 2)) are out of phase,
     and their amplitudes N^-4 add up to N^-3.
     """
-    method = 4 if analysis == "dynamic" and scene.numerics.spectral_radius == 1.0 else 3
+    method = 4 if analysis == "dynamic" and wanted_radius(scene) == 1.0 else 3
     if is_released(scene, analysis):
         order = Fraction(RELEASED_TAIL * method, 2 * method + 2)
         return TheoreticalOrder(float(order), f"released shape: {order}, the vibrations beyond the steps are out of phase")

@@ -19,7 +19,7 @@ from fem_needle.dynamics.push import WHY, Push, longest_step, run_limits
 from fem_needle.dynamics.vibration import Vibration, under_way, vibration_samples
 from fem_needle.initial import initial_state
 from fem_needle.limits import check_steps
-from fem_needle.motion import depth_law
+from fem_needle.motion import depth_law, may_move, wanted_radius
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene
@@ -75,11 +75,9 @@ def without_inertia(scene: Scene) -> Integration:
 
 
 def spectral_radius(plant: Plant, scene: Scene) -> float:
-    """Return the scene's, lowered where the plant needs it to stay stable while it moves."""
-    asked = scene.numerics.spectral_radius
-    lowest, highest = scene.insertion.depth_range(scene.duration)
-    moves = highest > lowest or scene.insertion.kind in {"force", "speed"}  # a speed of 0 may be commanded to change
-    return min(asked, plant.largest_spectral_radius) if moves else asked
+    """Return what the scene wants, lowered where the plant needs it to stay stable while it moves."""
+    wanted = wanted_radius(scene)
+    return min(wanted, plant.largest_spectral_radius) if may_move(scene) else wanted
 
 
 def begun(plant: Plant, integration: Integration) -> Engine:

@@ -18,7 +18,7 @@ from fem_needle.free_response import frozen_matrices, vibrations
 from fem_needle.initial import initial_state
 from fem_needle.ledger import StepEnd
 from fem_needle.loads import is_steady, load_case, turns_with_needle
-from fem_needle.motion import depth_law
+from fem_needle.motion import depth_law, wanted_radius
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene
@@ -38,7 +38,7 @@ def is_free_to_swing(scene: Scene) -> bool:
     tissue = scene.tissue
     is_free = tissue.rest_line == "straight" and not any(layer.damping > 0 for layer in tissue.layers)
     is_clamped = not scene.support.guides and not turns_with_needle(scene)
-    return is_free and is_clamped and scene.numerics.spectral_radius == 1.0 and scene.model.variant != "as-printed"
+    return is_free and is_clamped and wanted_radius(scene) == 1.0 and scene.model.variant != "as-printed"
 
 
 @dataclass(frozen=True, eq=False)

@@ -146,7 +146,8 @@ class Numerics(Part):
     analysis
         ``"dynamic"``, ``"quasi-static"``, ``"static"`` or ``"auto"``.
     spectral_radius
-        Of the integrator at infinite frequency: 1 no numerical damping, 0 the strongest.
+        Of the integrator at infinite frequency: 1 no numerical damping, 0 the strongest; "auto": 1, and 0 where the needle slides
+        in rigid guides or steps need not follow vibrations.
     output_step
         Time between samples [s] or ``"auto"``.
     output_points
@@ -164,7 +165,7 @@ class Numerics(Part):
     tolerance: Annotated[float, Quantity(at_least=1e-10, at_most=0.1)] = 1e-3
     absolute_tolerance: Annotated[float, Quantity("m", above=0.0)] = 1e-9
     analysis: Literal["auto", "dynamic", "quasi-static", "static"] = "auto"
-    spectral_radius: Annotated[float, Quantity(at_least=0.0, at_most=1.0)] = 1.0
+    spectral_radius: Annotated[float | Literal["auto"], Quantity(at_least=0.0, at_most=1.0, words=("auto",))] = "auto"
     output_step: Annotated[float | Literal["auto"], _STEP] = "auto"
     output_points: Annotated[int, Quantity(at_least=2, at_most=100_001, integer=True)] = 101
     loop: Literal["auto", "compiled", "numpy"] = "auto"

@@ -135,7 +135,8 @@ def test_needle_sliding_through_a_rigid_guide():
 
 @pytest.mark.xfail(strict=True, reason="undamped rigid guide after a jerk of the hub: 8e-5, not falling with the step")
 def test_needle_sliding_through_a_rigid_guide_after_a_jerk():
-    assert residual_of(scene("hub", IN, GEL, FINGER, support=RIGID | TURN), "dynamic") < 1e-6
+    undamped = Numerics(spectral_radius=1.0)  # which nobody gets who does not ask for it
+    assert residual_of(scene("hub", IN, GEL, FINGER, support=RIGID | TURN, numerics=undamped), "dynamic") < 1e-6
 
 
 def test_rigid_guide_at_a_node():

@@ -88,7 +88,7 @@ def test_a_needle_in_two_ways_or_none_is_refused(keys, message):
         (lambda x: Numerics(time_step=x), "time_step", (1e-9, "auto"), (0.0, -1.0, "fast")),
         (lambda x: Numerics(tolerance=x), "tolerance", (1e-10, 0.1), (9e-11, 0.11)),
         (lambda x: Numerics(absolute_tolerance=x), "absolute_tolerance", (1e-30,), (0.0,)),
-        (lambda x: Numerics(spectral_radius=x), "spectral_radius", (0.0, 1.0), (-0.1, 1.1)),
+        (lambda x: Numerics(spectral_radius=x), "spectral_radius", (0.0, 1.0, "auto"), (-0.1, 1.1, "none")),
         (lambda x: Numerics(output_step=x), "output_step", (1e-9, "auto"), (0.0,)),
         (lambda x: Numerics(output_points=x), "output_points", (2, 100_001), (1, 100_002)),
     ],
