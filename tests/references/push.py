@@ -199,7 +199,8 @@ def _advance(push, state, until, direction):
             return (end, direction) if push.freed(still)[0] > 0.0 else (still, 0.0)
         return end, direction
     if end.speed * direction < 0.0:
-        end = push.stopped(first(lambda there: there.speed))
+        soon = push.step(state, 1e-9 * h, direction)  # an instant to land on may be that of a stop
+        end = push.stopped(first(lambda there: there.speed) if soon.speed * direction > 0.0 else state)
         return end, push.freed(end)[0]
     return end, direction
 
