@@ -192,7 +192,7 @@ def test_a_membrane_stops_a_needle_that_is_too_weak_and_a_ramp_pierces_it():
 
 
 def test_a_needle_goes_back_in_without_cutting():
-    """A cosine pushes against 0.1 N and 0.5 N of cutting: in, out once it pulls by 0.1 N, and in again behind the deepest point."""
+    """A cosine pushes against 0.1 N and 0.5 N of cutting: in, out from -0.1 N on, and in again behind the deepest point."""
     layers = (Layer(start=0.0, foundation_modulus=5e3, cutting_force=0.5),)
     push = Sinusoid(amplitude=1.0, frequency=50.0, phase=np.pi / 2)
     scene = scene_of("hub", pushed(push), layers, (), friction=Friction(coulomb=0.1))
