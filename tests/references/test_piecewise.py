@@ -211,19 +211,21 @@ def test_a_needle_goes_back_in_without_cutting():
     assert pushed_motion(scene, np.array(stops), 8, 2e3).depth == pytest.approx(depths, abs=1e-10)
 
 
-@pytest.mark.parametrize("kind", ["entry", pytest.param("hub", marks=pytest.mark.slow)])
-def test_deflection_and_depth_share_their_energy(kind):
+@pytest.mark.parametrize(
+    ("kind", "steps", "allowed"), [("entry", 1e4, 1e-3), pytest.param("hub", 2e4, 2e-5, marks=pytest.mark.slow)]
+)
+def test_deflection_and_depth_share_their_energy(kind, steps, allowed):
     """Nothing is lost but what friction takes; the bent, swinging needle moves itself."""
     swinging = {"initial": Initial(shape="tip-displaced", tip_deflection=1e-2), "friction": Friction(coulomb=0.02)}
     scene, time = scene_of(kind, pushed(0.1), GEL, [TipLoad(force=0.3)], **swinging), np.linspace(0.0, 0.01, 6)
-    found = pushed_motion(scene, time, 8, 1e4)
+    found = pushed_motion(scene, time, 8, steps)
     total = found.energy - 0.08 * (found.depth - 0.06) - 0.3 * found.tip_deflection
     assert np.all(np.diff(found.depth) > 0.0)
-    assert total == pytest.approx(np.full(6, total[0]), abs=1e-3 * np.max(found.energy))
+    assert total == pytest.approx(np.full(6, total[0]), abs=allowed * np.max(found.energy))
     alone = 0.06 + 0.5 * 0.08 * time[-1] ** 2 / MASS
     assert abs(found.depth[-1] - alone) > 3e-4
     work = 0.5 * MASS * (2.0 * (found.depth[-1] - alone) / time[-1]) ** 2  # of A, about
-    assert work > 5e-3 * np.max(found.energy)
+    assert work > 5.0 * allowed * np.max(found.energy)
 
 
 @pytest.mark.slow
