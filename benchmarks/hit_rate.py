@@ -1,31 +1,41 @@
 """How often automatic settings keep the tolerance, how honest their error estimate is, and what they cost.
 
-    python -m benchmarks.hit_rate --seeds 0 40 --tolerances 1e-2 1e-3 --out benchmarks/results/hit_rate.csv
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.hit_rate --seeds 0 500 --out benchmarks/results/hit_rate.csv
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.hit_rate --new --out new.csv
 
-Random scenes (`tests/consistency/random_scenes.py`); the truth comes from spectral solvers that share no code with the needle.
+Random scenes of every kind (`tests/consistency/random_kinds.py`): a seed announces its kind, seeds 0 to 499 are the announced
+ones, `--new` takes 100 that follow from the version. The truth comes from spectral solvers that share no code with the needle
+and are refined until two of them agree (`tests/consistency/truth.py`). A scene that is refused, fails or takes long is a miss.
 The cheapest fixed setting is looked for from the automatic one downwards: fewer elements, then longer steps, until the tolerance
-is missed. Cost is steps times unknowns, trial runs included.
+is missed. Cost is steps times unknowns, trial runs included. Rows of other seeds and tolerances that the file has are kept.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import hashlib
 import time
 import warnings
 from functools import lru_cache
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
 from fem_needle import FiniteElementNeedle, NeedleError, run_scene, simulate
-from tests.consistency.random_scenes import OUTPUTS, random_scene, true_tips
+from tests.consistency.random_kinds import KINDS, kind_of, scene_of_seed
+from tests.consistency.random_scenes import OUTPUTS
+from tests.consistency.truth import Truth, true_rows
 
 FIELDS = (
-    "seed", "support", "insertion", "initial", "tolerance", "analysis", "elements", "steps", "cost", "error", "estimate",
-    "uncertainty", "fixed_elements", "fixed_steps", "fixed_cost", "seconds", "note",
+    "seed", "kind", "support", "insertion", "initial", "tolerance", "analysis", "elements", "steps", "cost", "error", "estimate",
+    "uncertainty", "fixed_elements", "fixed_steps", "fixed_cost", "seconds", "truth", "note",
 )  # fmt: skip
-SHARE = 0.3  # of the difference of two truths: what the finer one may miss
+KNOWN = 0.3  # of the tolerance: what the truth may miss
+WANTED = KNOWN * 1e-5  # to which truths are refined
+UNKNOWN = "truth unknown"
+NEW = 100
 ELEMENTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 LONGER = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 
@@ -48,15 +58,17 @@ class Patience:
         """Ignore."""
 
 
+def new_seeds(release: str | None = None) -> range:
+    """Return the fresh seeds of a version, default the installed one."""
+    first = 1000 + int(hashlib.sha256((release or version("fem-needle")).encode()).hexdigest()[:7], 16)
+    return range(first, first + NEW)
+
+
 def measured(seed: int, tolerance: float, seconds: float, *, fixed: bool) -> dict[str, object]:
     """Return one row of the table."""
-    scene = random_scene(seed).with_value("numerics.tolerance", tolerance)
-    row: dict[str, object] = dict.fromkeys(FIELDS, "") | {"seed": seed, "tolerance": tolerance}
+    scene = scene_of_seed(seed).with_value("numerics.tolerance", tolerance)
+    row: dict[str, object] = dict.fromkeys(FIELDS, "") | {"seed": seed, "kind": kind_of(seed), "tolerance": tolerance}
     row |= {"support": scene.support.kind, "insertion": scene.insertion.kind, "initial": scene.initial.shape}
-    truth, uncertainty = _truth(seed)
-    row |= {"uncertainty": SHARE * uncertainty}
-    if SHARE * uncertainty > 0.3 * tolerance:
-        return row | {"note": "truth unknown"}
     started = time.perf_counter()
     try:
         run = run_scene(scene, observer=Patience(seconds))
@@ -65,21 +77,19 @@ def measured(seed: int, tolerance: float, seconds: float, *, fixed: bool) -> dic
     row |= {name: run.summary[name] for name in ("analysis", "elements", "steps")} | {"seconds": time.perf_counter() - started}
     if run.summary["stop_reason"] == "interrupted":
         return row | {"note": "took too long"}
-    error = error_of(run.tip_deflection, truth)
-    row |= {"cost": run.summary["step_unknowns"], "error": error, "estimate": run.summary["error_estimate"]}
-    row |= {"note": "; ".join(text.split(":")[0] for text in run.summary["warnings"])}
+    truth = _truth(seed)
+    row |= {"cost": run.summary["step_unknowns"], "estimate": run.summary["error_estimate"]}
+    row |= {"uncertainty": truth.doubt, "truth": "pieces"}
+    if truth.doubt > KNOWN * tolerance:
+        return row | {"note": UNKNOWN}
+    error = truth.error(run)
+    row |= {"error": error, "note": "; ".join(text.split(":")[0] for text in run.summary["warnings"])}
     return row | (cheapest(scene, run, truth, tolerance) if fixed and error <= tolerance else {})
 
 
 @lru_cache(maxsize=1)
-def _truth(seed: int) -> tuple[np.ndarray, float]:
-    scene = random_scene(seed)
-    return true_tips(scene, np.linspace(0.0, scene.duration, OUTPUTS + 1))
-
-
-def error_of(tips: np.ndarray, truth: np.ndarray) -> float:
-    """Return the largest difference relative to the largest tip."""
-    return float(np.max(np.abs(tips - truth)) / np.max(np.abs(truth)))
+def _truth(seed: int) -> Truth:
+    return true_rows(scene_of_seed(seed), WANTED)
 
 
 def cheapest(scene, run, truth, tolerance):
@@ -89,7 +99,7 @@ def cheapest(scene, run, truth, tolerance):
     def tried(elements, step):
         plant = FiniteElementNeedle(scene, elements=elements)
         fixed = simulate(plant, time_step=step, analysis=analysis)
-        return error_of(fixed.tip_deflection, truth), fixed.summary["steps"], plant.size
+        return truth.error(fixed), fixed.summary["steps"], plant.size
 
     count, longest = int(run.summary["elements"]), scene.duration / OUTPUTS
     step = min(run.summary["time_step"], longest)
@@ -110,49 +120,74 @@ def cheapest(scene, run, truth, tolerance):
 
 
 def summarized(rows: list[dict[str, object]]) -> str:
-    """Return a table: for each tolerance the hit rates and the quantiles of estimate / error and cost / cheapest cost."""
-    heads = ("tolerance", "scenes", "below tolerance", "below estimate", "estimate / error", "cost / cheapest", "left out")
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    """Return a table: for each tolerance and kind hit rates and quantiles of estimate / error and cost / cheapest."""
+    heads = ("tolerance", "kind", "scenes", "hits", "misses", "truth unknown", "below estimate", "estimate / error", "1 to 20")
+    lines = [f"| {' | '.join((*heads, 'cost / cheapest'))} |", "|---" * (len(heads) + 1) + "|"]
     for tolerance in sorted({float(str(row["tolerance"])) for row in rows}, reverse=True):
-        mine = [row for row in rows if float(str(row["tolerance"])) == tolerance]
-        done = [row for row in mine if row["error"] not in {"", None}]
-        if not done:
-            continue
-        names = ("error", "estimate", "uncertainty")
-        error, estimate, doubt = (np.array([float(str(row[name])) for row in done]) for name in names)
-        ratio = estimate / np.maximum(error, 1e-300)
-        costs = [float(str(row["cost"])) / float(str(row["fixed_cost"])) for row in done if row["fixed_cost"] != ""]
-        lines.append(
-            f"| {tolerance:g} | {len(done)} | {np.sum(error <= tolerance)} | {np.sum(error <= estimate + doubt)} | "
-            f"{_quantiles(ratio)} | {_quantiles(np.array(costs)) if costs else ''} | {len(mine) - len(done)} |"
-        )
+        for kind in ("all", *KINDS):
+            mine = [row for row in rows if float(str(row["tolerance"])) == tolerance and kind in {"all", row["kind"]}]
+            if mine:
+                lines.append(f"| {tolerance:g} | {kind} | {_line(mine, tolerance)} |")
     return "\n".join(lines)
 
 
+def _line(rows: list[dict[str, object]], tolerance: float) -> str:
+    unknown = sum(row["note"] == UNKNOWN for row in rows)
+    done = [row for row in rows if row["error"] not in {"", None}]
+    error, estimate, doubt = (_column(done, name) for name in ("error", "estimate", "uncertainty"))
+    hits = int(np.sum(error <= tolerance))
+    counts = f"{len(rows)} | {hits} | {len(rows) - unknown - hits} | {unknown} | {int(np.sum(error <= estimate + doubt))}"
+    ratio = estimate / np.maximum(error, 1e-300)
+    priced = [row for row in done if row["fixed_cost"] not in {"", None}]
+    costs = _column(priced, "cost") / np.maximum(_column(priced, "fixed_cost"), 1.0)
+    between = f"{np.mean((ratio >= 1.0) & (ratio <= 20.0)):.0%}" if done else ""
+    return f"{counts} | {_quantiles(ratio)} | {between} | {_quantiles(costs)}"
+
+
+def _column(rows: list[dict[str, object]], name: str) -> np.ndarray:
+    return np.array([float(str(row[name])) for row in rows])
+
+
 def _quantiles(values: np.ndarray) -> str:
-    return " / ".join(f"{value:.2g}" for value in np.quantile(values, (0.1, 0.5, 0.9)))
+    return " / ".join(f"{value:.2g}" for value in np.quantile(values, (0.1, 0.5, 0.9))) if values.size else ""
+
+
+def _kept(path: Path | None) -> dict[tuple[int, float], dict[str, object]]:
+    if path is None or not path.exists():
+        return {}
+    with path.open(newline="", encoding="utf-8") as file:
+        return {(int(row["seed"]), float(row["tolerance"])): dict(row) for row in csv.DictReader(file)}
+
+
+def _write(path: Path, rows: dict[tuple[int, float], dict[str, object]]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, FIELDS)
+        writer.writeheader()
+        writer.writerows(rows[key] for key in sorted(rows, key=lambda key: (key[0], -key[1])))
 
 
 def main() -> None:
     """Measure, print and write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, nargs=2, default=(0, 20))
-    parser.add_argument("--tolerances", type=float, nargs="+", default=(1e-2, 1e-3))
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 20], help="start, stop and step as of range()")
+    parser.add_argument("--new", action="store_true", help=f"the {NEW} fresh seeds of this version")
+    parser.add_argument("--tolerances", type=float, nargs="+", default=(1e-2, 1e-3, 1e-4, 1e-5))
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--no-fixed", action="store_true")
+    parser.add_argument("--fixed-from", type=float, default=0.0, help="tolerance below which no fixed setting is looked for")
     parser.add_argument("--out", type=Path)
-    given, rows = parser.parse_args(), list[dict[str, object]]()
+    given = parser.parse_args()
+    rows = _kept(given.out)
     warnings.simplefilter("ignore")
-    for seed in range(*given.seeds):
+    for seed in new_seeds() if given.new else range(*given.seeds):
         for tolerance in given.tolerances:
-            rows.append(measured(seed, tolerance, given.seconds, fixed=not given.no_fixed))
-            print({name: value for name, value in rows[-1].items() if value != ""}, flush=True)
-            if given.out:
-                with given.out.open("w", newline="", encoding="utf-8") as file:
-                    writer = csv.DictWriter(file, FIELDS)
-                    writer.writeheader()
-                    writer.writerows(rows)
-    print(summarized(rows))
+            fixed = not given.no_fixed and tolerance >= given.fixed_from
+            row = measured(seed, tolerance, given.seconds, fixed=fixed)
+            rows[seed, tolerance] = row
+            print({name: value for name, value in row.items() if value != ""}, flush=True)
+        if given.out:
+            _write(given.out, rows)
+    print(summarized(list(rows.values())))
 
 
 if __name__ == "__main__":

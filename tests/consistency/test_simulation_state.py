@@ -131,6 +131,7 @@ def test_every_shipped_scene_can_be_stepped(name):
 def test_copies_of_needles_whose_matrices_are_asked_for(name):
     scene, analysis, commands = CASES[name]
     plant = AssumedModeNeedle(scene, modes=5)
+    plant.is_polynomial = False
     assert not is_known(plant)
     simulation = Simulation(plant, time_step=3e-4, analysis=analysis, output_step=1.3e-3)
     went_on(simulation, commands[:3])

@@ -94,15 +94,18 @@ class Loading:
     def tip_force(self, time, depth):
         total = np.zeros(np.shape(time))
         for load in self.scene.loads:
-            if load.kind == "tip" and load.force is not None:
-                total = total + as_function(load.force).value(time)
-            elif load.kind == "tip":
-                total = total + load.bevel_coefficient * self.layer_modulus(depth) * self.factor.value(time)
+            if load.kind != "tip":
+                continue
+            turned = as_function(load.direction).value(time)
+            if load.force is not None:
+                total = total + turned * as_function(load.force).value(time)
+            else:
+                total = total + turned * load.bevel_coefficient * self.layer_modulus(depth) * self.factor.value(time)
         return total
 
     def kinks(self, duration):
         borders = [y for layer in self.layers for y in (layer.start, layer.far_side) if np.isfinite(y)]
         varying = [self.scene.tissue.stiffness_factor, self.scene.support.hub_deflection, self.scene.support.hub_angle]
-        varying += [load.force for load in self.scene.loads]
+        varying += [load.force for load in self.scene.loads] + [load.direction for load in self.scene.loads if load.kind == "tip"]
         tables = [t for value in varying if isinstance(value, Table) for t in value.time]
         return [*self.law.kinks(), *tables, *self.law.passes(borders, duration)]

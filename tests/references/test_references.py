@@ -47,7 +47,7 @@ BUZZ = Sinusoid(mean=0.1, amplitude=0.05, frequency=30.0, phase=0.5)
 
 def scene_of(kind, insertion, layers=GEL, loads=PUSH, **parts):
     return Scene(
-        needle=NEEDLE,
+        needle=parts.pop("needle", NEEDLE),
         support=Support(kind=kind, **parts.pop("support", {})),
         tissue=Tissue(layers=layers),
         insertion=insertion,
