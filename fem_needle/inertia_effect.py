@@ -40,6 +40,7 @@ SUDDEN = 2.0  # a load that comes at once moves an oscillator twice as far as on
 DECAYED = 0.25  # of the first swing is left at the end of the short steps: the tissue damps it
 LEFT_AFTER = 0.75 * SWINGS  # swings, after which it is looked at what is left
 SETTLING = 4  # long steps, in which the method damps what still swings
+SMALLEST_LEFT = 1e-9
 UNDAMPED = 0.9  # of the first swing is left: it may be all of it, seen in few steps
 
 
@@ -83,11 +84,12 @@ class Response:
         return self.left >= DECAYED
 
     def at(self, time: float) -> float:
-        """Return what is left of the vibration at a time [s]; it is taken to decay half as fast as it was seen to."""
-        if not self.stays or time < self.begin:
+        """Return what is left of the vibration at a time [s]; one that stays is taken to decay half as fast as it was seen to."""
+        if time < self.begin:
             return 0.0
-        swings = (time - self.begin) / (2.0 * LEFT_AFTER * self.period) if self.left < UNDAMPED else 0.0
-        return self.swing * float(self.left**swings)
+        slower = 2.0 if self.stays else 1.0
+        swings = (time - self.begin) / (slower * LEFT_AFTER * self.period) if self.left < UNDAMPED else 0.0
+        return self.swing * float(max(self.left, SMALLEST_LEFT) ** swings)
 
 
 @dataclass(frozen=True)
@@ -113,12 +115,11 @@ class Inertia:
 
     def lasting_at(self, response: Response, time: float) -> float:
         """Return how far inertia moves the tip at a time [s] between two kinks, but for vibrations that are damped at once."""
-        return SUDDEN * response.forced + sum(other.at(time) for other in self.responses)
+        return SUDDEN * response.forced + sum(other.at(time) for other in self.responses if other.stays)
 
     def moving_at(self, response: Response, time: float) -> float:
-        """Return the same with vibrations that are damped at once."""
-        passes = not response.stays and time < response.begin + SWINGS * response.period
-        return self.lasting_at(response, time) + (response.swing if passes else 0.0)
+        """Return the same with the vibration that is damped at once."""
+        return self.lasting_at(response, time) + (0.0 if response.stays else response.at(time))
 
 
 def inertia_effect(plant: Plant, enough: float = 0.0) -> float:

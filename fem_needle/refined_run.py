@@ -226,7 +226,7 @@ def _find_step(search: _Search, first: _Trial) -> None:
         expected = expectation([run.step for run in runs], differences, order, resolved=resolved)
         search.error = expected.bound
         if search.error <= search.allowed and runs[-1].is_whole:
-            if not _follows_vibrations(search, differences[0]):
+            if not _follows_vibrations(search, max(differences[0], search.job.choice.vibration)):
                 _settle_vibrations(search, *runs[-2:])
             return
         ratio = next_ratio(expected, AIM * search.allowed)

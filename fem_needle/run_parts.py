@@ -50,12 +50,10 @@ def parts_with_inertia(scene: Scene, effect: Inertia, output_step: float) -> tup
     allowed, is_free = VIBRATION_SHARE * scene.numerics.tolerance, scene.numerics.spectral_radius == "auto"
     is_damped = any(layer.damping > 0.0 for layer in scene.tissue.layers)
     lasts = f"what lasts moves the tip by up to {effect.lasting:.1e} of its largest deflection (allowed {allowed:.1e})"
-    if effect.lasting <= allowed:
-        how = PASSED_OVER if is_free and is_damped else FOLLOWED
-        return (Part(0.0, duration, how, f"{'of inertia' if how == FOLLOWED else 'the tissue damps vibrations,'} {lasts}"),)
+    if not is_free or (effect.lasting <= allowed and not is_damped):
+        return (Part(0.0, duration, FOLLOWED, f"of inertia {lasts}"),)
     outputs = output_times(duration, output_step)
-    parts = _alternating(scene, effect, allowed, outputs) if is_free else (Part(0.0, duration, FOLLOWED, f"of inertia {lasts}"),)
-    return _with_cosines(scene, parts, outputs)
+    return _with_cosines(scene, _alternating(scene, effect, allowed, outputs), outputs)
 
 
 def _whole(scene: Scene) -> Part:
@@ -82,12 +80,16 @@ def _alternating(scene: Scene, effect: Inertia, allowed: float, outputs: Sequenc
 
 
 def _pieces(effect: Inertia, allowed: float, outputs: Sequence[float]) -> Iterator[tuple[float, float, bool]]:
-    """Yield (begin, end, whether vibrations must be followed) from kink to kink, and where one has decayed at an output."""
+    """Yield (begin, end, whether vibrations must be followed) from kink to kink, and where one has decayed at an output.
+
+    A vibration that is damped before the first output behind its kink is seen nowhere.
+    """
     for response in effect.responses:
-        if effect.moving_at(response, response.begin) <= allowed:
+        times = outputs[bisect_right(outputs, response.begin) : bisect_left(outputs, response.end)]
+        seen = max((effect.moving_at(response, time) for time in times[:1]), default=0.0)
+        if max(seen, effect.lasting_at(response, response.begin)) <= allowed:
             yield response.begin, response.end, False
             continue
-        times = outputs[bisect_right(outputs, response.begin) : bisect_left(outputs, response.end)]
         quiet = next((time for time in times if effect.moving_at(response, time) <= allowed), response.end)
         yield response.begin, quiet, True
         if quiet < response.end:
