@@ -20,7 +20,7 @@ from fem_needle.limits import check_samples
 from fem_needle.loads import load_cases
 from fem_needle.motion import PUSH_SLACK, depth_law, lateral_values, run_duration, shortest_period
 from fem_needle.plant import Plant
-from fem_needle.run_parts import VIBRATION_SHARE, chooses_steps, most_lasting, parts_with_inertia, without_inertia_throughout
+from fem_needle.run_parts import VIBRATION_SHARE, chooses_steps, parts_with_inertia, without_inertia_throughout
 from fem_needle.scene import Scene, as_function
 from fem_needle.skipping import INERTIA_SHARE, Skipped, unneeded_terms
 
@@ -107,7 +107,7 @@ def _effect(scene: Scene, pilot: Callable[[], Plant]) -> Inertia:
 
 def _unresolved(scene: Scene, effect: Inertia, parts: tuple[Part, ...]) -> float:
     """Return how far vibrations that are not resolved move the tip, relative to its largest deflection."""
-    over = [most_lasting(effect, part.begin, part.end) for part in parts if part.how == PASSED_OVER]
+    over = [part.moved for part in parts if part.how == PASSED_OVER]
     if over:
         return max(over)
     return effect.ringing if effect.lasting <= VIBRATION_SHARE * scene.numerics.tolerance else 0.0

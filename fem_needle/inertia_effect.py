@@ -8,10 +8,10 @@ swings and whether the tissue damps it. Derivation: docs/theory.md, "What may be
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import ceil, inf, pi, sqrt
+from math import ceil, exp, inf, log, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ DECAYED = 0.25  # of the first swing is left at the end of the short steps: the 
 LEFT_AFTER = 0.75 * SWINGS  # swings, after which it is looked at what is left
 SETTLING = 4  # long steps, in which the method damps what still swings
 SMALLEST_LEFT = 1e-9
+FORGOTTEN = 1e-9  # of the largest tip: what has decayed to it
 UNDAMPED = 0.9  # of the first swing is left: it may be all of it, seen in few steps
 
 
@@ -69,6 +70,10 @@ class Response:
         How much of it is left after `LEFT_AFTER` swings, 0 to 1.
     period
         Of the slowest vibration [s].
+    kept
+        Vibrations of earlier kinks that do not decay.
+    before, before_rate
+        Those that decay, at the first kink, and how fast at least [1/s].
     """
 
     begin: float
@@ -77,19 +82,33 @@ class Response:
     swing: float
     left: float
     period: float
+    kept: float = 0.0
+    before: float = 0.0
+    before_rate: float = 0.0
 
     @property
     def stays(self) -> bool:
         """Whether the tissue lets the vibration stay for many swings."""
         return self.left >= DECAYED
 
-    def at(self, time: float) -> float:
-        """Return what is left of the vibration at a time [s]; one that stays is taken to decay half as fast as it was seen to."""
-        if time < self.begin:
-            return 0.0
+    @property
+    def rate(self) -> float:
+        """How fast it decays at least [1/s]; one that stays is taken to do so half as fast as it was seen to."""
         slower = 2.0 if self.stays else 1.0
-        swings = (time - self.begin) / (slower * LEFT_AFTER * self.period) if self.left < UNDAMPED else 0.0
-        return self.swing * float(max(self.left, SMALLEST_LEFT) ** swings)
+        return -log(max(self.left, SMALLEST_LEFT)) / (slower * LEFT_AFTER * self.period) if self.left < UNDAMPED else 0.0
+
+    def own_at(self, time: float) -> float:
+        """Return what is left of the vibration at a time [s]."""
+        return self.swing * exp(-self.rate * (time - self.begin))
+
+    def lasting_at(self, time: float) -> float:
+        """Return how far inertia moves the tip at a time [s], but for a vibration that is damped at once."""
+        earlier = self.kept + self.before * exp(-self.before_rate * (time - self.begin))
+        return SUDDEN * self.forced + earlier + (self.own_at(time) if self.stays else 0.0)
+
+    def moving_at(self, time: float) -> float:
+        """Return the same with the vibration that is damped at once."""
+        return self.lasting_at(time) + (0.0 if self.stays else self.own_at(time))
 
 
 @dataclass(frozen=True)
@@ -112,14 +131,6 @@ class Inertia:
     lasting: float
     ringing: float
     responses: tuple[Response, ...] = ()
-
-    def lasting_at(self, response: Response, time: float) -> float:
-        """Return how far inertia moves the tip at a time [s] between two kinks, but for vibrations that are damped at once."""
-        return SUDDEN * response.forced + sum(other.at(time) for other in self.responses if other.stays)
-
-    def moving_at(self, response: Response, time: float) -> float:
-        """Return the same with the vibration that is damped at once."""
-        return self.lasting_at(response, time) + (0.0 if response.stays else response.at(time))
 
 
 def inertia_effect(plant: Plant, enough: float = 0.0) -> float:
@@ -153,7 +164,7 @@ def inertia_of(plant: Plant, enough: float = 0.0) -> Inertia:
         if bound <= enough:
             return Inertia(bound, bound, bound)
     fast = _tips(plant, grid, Integration(DYNAMIC, collocation(0.0)))
-    found = tuple(_responses(scene, kinks, np.array(grid.outputs), is_short, np.abs(fast - slow) / largest))
+    found = tuple(_carried(_responses(scene, kinks, np.array(grid.outputs), is_short, np.abs(fast - slow) / largest)))
     staying = sum(response.swing for response in found if response.stays)
     passing = max((response.swing for response in found if not response.stays), default=0.0)
     lasting = SUDDEN * max(response.forced for response in found) + staying
@@ -176,26 +187,42 @@ def _responses(
     scene: Scene, kinks: Sequence[_Kink], time: Array, is_short: NDArray[np.bool_], difference: Array
 ) -> Iterator[Response]:
     """Yield what inertia does from kink to kink, from what it does at times [s]."""
-    for number, (kink, following) in enumerate(pairwise(kinks)):
-        inside = (time >= kink.time) & (time <= following.time)
-        short, long = difference[inside & is_short], difference[inside & ~is_short]
+    growths = _growths(kinks, is_growing=scene.support.kind == "entry")
+    for (kink, following), growth in zip(pairwise(kinks), growths, strict=True):
+        inside = slice(np.searchsorted(time, kink.time), np.searchsorted(time, following.time, side="right"))
+        short, long = difference[inside][is_short[inside]], difference[inside][~is_short[inside]]
         settled = long[SETTLING:] if len(long) > 2 * SETTLING and len(short) else long
         level, swing, left = float(np.max(settled, initial=0.0)), 0.0, 0.0
         if len(short):
             first, last = (max(float(np.max(part)) - level, 0.0) for part in (short, short[-len(short) // 4 :]))
             swing, left = FASTER * first, last / first if first > 0.0 else 0.0
         if left >= DECAYED:
-            swing *= _growth(kink, kinks[number + 1 :], is_growing=scene.support.kind == "entry")
+            swing *= growth
         yield Response(kink.time, following.time, level, swing, left, 2 * pi / kink.frequency)
 
 
-def _growth(kink: _Kink, later: Sequence[_Kink], *, is_growing: bool) -> float:
-    """Return how much a vibration grows while the needle moves on: its energy over its frequency stays.
+def _carried(responses: Iterable[Response]) -> Iterator[Response]:
+    """Yield responses with what earlier ones have left."""
+    kept, decaying, rate = 0.0, 0.0, inf
+    for response in responses:
+        yield replace(response, kept=kept, before=decaying, before_rate=rate if decaying else 0.0)
+        decaying *= exp(-rate * (response.end - response.begin)) if decaying else 0.0
+        if response.stays and response.rate == 0.0:
+            kept += response.swing
+        elif response.stays:
+            decaying, rate = decaying + response.own_at(response.end), min(rate, response.rate)
+        if decaying < FORGOTTEN:
+            decaying, rate = 0.0, inf
+
+
+def _growths(kinks: Sequence[_Kink], *, is_growing: bool) -> Array:
+    """Return how much a vibration that begins at a kink grows while the needle moves on: its energy over its frequency stays.
 
     The tip of a vibration of unit mass moves by 1 / sqrt(z) of the inserted part under ``entry``, always the same at the hub.
     """
-    reached = [kink.frequency / other.frequency * (kink.depth / other.depth if is_growing else 1.0) for other in later]
-    return sqrt(max(1.0, *reached))
+    stiffness = np.array([kink.frequency * (kink.depth if is_growing else 1.0) for kink in kinks])
+    least = np.minimum.accumulate(stiffness[::-1])[::-1]
+    return np.sqrt(np.maximum(1.0, stiffness[:-1] / least[1:]))
 
 
 def _kinks(plant: Plant) -> list[_Kink]:

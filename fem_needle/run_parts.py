@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
 import numpy as np
@@ -26,6 +27,16 @@ LEAST_QUIET = 0.05  # of a run: shorter parts in which steps may be long are not
 INSTANTS = 201  # of a part, at which it is looked whether anything moves
 HELD = "held, undamped, under constant loads: eigenvectors once, no steps"
 LEAST_HOLD = 3  # outputs: a shorter hold is not worth eigenvectors
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A piece of a run: times [s], whether steps follow vibrations, how far inertia moves the tip."""
+
+    begin: float
+    end: float
+    is_followed: bool
+    moved: float
 
 
 def without_inertia_throughout(scene: Scene, analysis: str, reason: str) -> Part:
@@ -68,44 +79,42 @@ def _whole(scene: Scene) -> Part:
 
 def _alternating(scene: Scene, effect: Inertia, allowed: float, outputs: Sequence[float]) -> tuple[Part, ...]:
     """Return parts in which vibrations are followed and parts in which they are passed over."""
-    duration, found = run_duration(scene), list[tuple[float, float, bool]]()
-    for moves, group in groupby(_pieces(effect, allowed, outputs), lambda piece: piece[2]):
+    duration, found = run_duration(scene), list[_Piece]()
+    for moves, group in groupby(_pieces(effect, allowed, outputs), lambda piece: piece.is_followed):
         rows = list(group)
-        begin, end = rows[0][0], rows[-1][1]
-        is_followed = moves or end - begin < LEAST_QUIET * duration
-        if found and found[-1][2] == is_followed:
-            begin = found.pop()[0]
-        found.append((begin, end, is_followed))
-    return tuple(_part(effect, allowed, *row) for row in found)
+        piece = _Piece(rows[0].begin, rows[-1].end, moves, max(row.moved for row in rows))
+        if piece.end - piece.begin < LEAST_QUIET * duration:
+            piece = replace(piece, is_followed=True)
+        if found and found[-1].is_followed == piece.is_followed:
+            before = found.pop()
+            piece = replace(piece, begin=before.begin, moved=max(before.moved, piece.moved))
+        found.append(piece)
+    return tuple(_part(piece, allowed) for piece in found)
 
 
-def _pieces(effect: Inertia, allowed: float, outputs: Sequence[float]) -> Iterator[tuple[float, float, bool]]:
-    """Yield (begin, end, whether vibrations must be followed) from kink to kink, and where one has decayed at an output.
+def _pieces(effect: Inertia, allowed: float, outputs: Sequence[float]) -> Iterator[_Piece]:
+    """Yield pieces from kink to kink, cut at the output at which a vibration has decayed.
 
-    A vibration that is damped before the first output behind its kink is seen nowhere.
+    A vibration that is damped before the first output behind its kink is seen nowhere; of larger ones the ledger would miss the
+    energy, which is as the square of the swing.
     """
     for response in effect.responses:
         times = outputs[bisect_right(outputs, response.begin) : bisect_left(outputs, response.end)]
-        seen = max((effect.moving_at(response, time) for time in times[:1]), default=0.0)
-        if max(seen, effect.lasting_at(response, response.begin)) <= allowed:
-            yield response.begin, response.end, False
+        lasting = response.lasting_at(response.begin)
+        seen = max(lasting, response.moving_at(times[0]) if times else 0.0)
+        if seen <= allowed and response.swing**2 * VIBRATION_SHARE <= allowed:
+            yield _Piece(response.begin, response.end, False, lasting)
             continue
-        quiet = next((time for time in times if effect.moving_at(response, time) <= allowed), response.end)
-        yield response.begin, quiet, True
+        quiet = next((time for time in times if response.moving_at(time) <= allowed), response.end)
+        yield _Piece(response.begin, quiet, True, response.moving_at(response.begin))
         if quiet < response.end:
-            yield quiet, response.end, False
+            yield _Piece(quiet, response.end, False, response.lasting_at(quiet))
 
 
-def _part(effect: Inertia, allowed: float, begin: float, end: float, is_followed: bool) -> Part:
-    moved = most_lasting(effect, begin, end)
-    how = FOLLOWED if is_followed else PASSED_OVER
-    return Part(begin, end, how, f"inertia moves the tip by up to {moved:.1e} of its largest deflection (allowed {allowed:.1e})")
-
-
-def most_lasting(effect: Inertia, begin: float, end: float) -> float:
-    """Return how far inertia moves the tip at most between two times [s], but for vibrations that are damped at once."""
-    inside = [response for response in effect.responses if response.begin < end and response.end > begin]
-    return max(effect.lasting_at(response, max(begin, response.begin)) for response in inside)
+def _part(piece: _Piece, allowed: float) -> Part:
+    how = FOLLOWED if piece.is_followed else PASSED_OVER
+    reason = f"inertia moves the tip by up to {piece.moved:.1e} of its largest deflection (allowed {allowed:.1e})"
+    return Part(piece.begin, piece.end, how, reason, piece.moved)
 
 
 def _with_cosines(scene: Scene, parts: Sequence[Part], outputs: Sequence[float]) -> tuple[Part, ...]:
@@ -115,7 +124,7 @@ def _with_cosines(scene: Scene, parts: Sequence[Part], outputs: Sequence[float])
     behind, last = outputs[bisect_right(outputs, held + 1e-9 * duration) :], parts[-1]
     if len(behind) < LEAST_HOLD or last.how != FOLLOWED or last.begin >= behind[0]:
         return tuple(parts)
-    before = Part(last.begin, behind[0], last.how, last.reason)
+    before = replace(last, end=behind[0])
     return (*parts[:-1], before, Part(behind[0], duration, COSINES, HELD))
 
 

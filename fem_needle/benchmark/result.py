@@ -92,11 +92,11 @@ class ScalingRow:
     Attributes
     ----------
     over
-        "elements" or "duration".
+        "elements", "duration", "pieces of a cut path", "points of a table" or "runs".
     method
         Name.
     size
-        Elements, or seconds.
+        How many, or seconds.
     per_step
         Time of a step [s]; None if it failed.
     total

@@ -33,7 +33,7 @@ def register(application: typer.Typer) -> None:
 def benchmark(
     cases: Names = None,
     goals: Annotated[bool, typer.Option("--goals", help="Measure every goal: goal, measured, met.")] = False,
-    scaling: Annotated[bool, typer.Option("--scaling", help="Cost over elements and duration, memory.")] = False,
+    scaling: Annotated[bool, typer.Option("--scaling", help="Cost over elements, duration, path, tables, runs; memory.")] = False,
     repeats: Annotated[int, typer.Option(metavar="N", help="Rounds in which the methods take turns.")] = 5,
     quick: Annotated[bool, typer.Option("--quick", help="One round of the two coarsest settings of each method.")] = False,
     rivals: Scripts = None,
@@ -69,7 +69,7 @@ def _measure(
     from dataclasses import replace
 
     from fem_needle.benchmark.goals import goal_rows
-    from fem_needle.benchmark.scaling import DURATIONS, ELEMENTS
+    from fem_needle.benchmark.scaling import QUICK, Sizes
     from fem_needle.benchmark.scaling import scaling as measure_scaling
     from fem_needle.benchmark.study import benchmark as compute
 
@@ -82,8 +82,7 @@ def _measure(
         scenes = QUICK_RANDOM_SCENES if quick else RANDOM_SCENES
         study = replace(study, goals=goal_rows(study.rows, scenes, tell))
     if scaling:
-        elements, durations = (ELEMENTS[:3], DURATIONS[:2]) if quick else (ELEMENTS, DURATIONS)
-        study = replace(study, scaling=measure_scaling(elements, durations, tell))
+        study = replace(study, scaling=measure_scaling(QUICK if quick else Sizes(), tell))
     return study
 
 

@@ -73,9 +73,9 @@ def _show_goals(goals: tuple[GoalRow, ...]) -> None:
 
 
 def _show_scaling(rows: tuple[ScalingRow, ...]) -> None:
-    table = new_table("Scaling of case M", "over", "size", "method", "step [us]", "run [s]", "memory [MB]", "")
+    table = new_table("Scaling", "over", "size", "method", "step [us]", "run [s]", "memory [MB]", "")
     for row in rows:
-        size = f"{row.size:g}" if row.over == "elements" else f"{row.size:g} s"
+        size = f"{row.size:g} s" if row.over == "duration" else f"{row.size:g}"
         cells = (_scaled(row.per_step, MICRO), _scaled(row.total, 1.0), _scaled(row.memory, MEGA))
         table.add_row(row.over, size, row.method, *cells, row.note)
     show(table)

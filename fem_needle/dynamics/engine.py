@@ -109,13 +109,13 @@ class Engine:
         return limits
 
     def advance(self, intervals: Array, *, counted: bool, from_start: bool = False) -> tuple[int, Samples]:
-        """Go through smooth intervals: start and end [s], steps, whether the end is an output (I, 4).
+        """Go through smooth intervals: start and end [s], steps, ENDS_AT_OUTPUT + BEGINS_AT_KINK (I, 4).
 
         Returns how it ended (`names`) and the samples of the outputs; ``from_start``: also one of the first instant.
         ``counted``: what a kink at the start does enters the works.
         """
         work, cursor = self._work, self._work[at.CURSOR]
-        rows = int(np.count_nonzero(intervals[:, 3])) + from_start
+        rows = int(np.count_nonzero(intervals[:, 3] % 2)) + from_start
         record = np.zeros((rows, at.RECORD + self.model.size + self.model.points + int(self.model.switches[at.GUIDES])))
         if self.cuts:
             self.live.reserve(int(np.sum(intervals[:, 2])))
@@ -190,21 +190,27 @@ def failed_step(time: float, depth: float, what: str) -> ComputationError:
 
 
 def smooth_stretches(
-    intervals: Iterator[tuple[float, float, int]], outputs: set[float], landings: set[float], size: int
-) -> Generator[tuple[bool, Array], None, None]:
-    """Yield whether a stretch begins at a kink, and its intervals: cut at kinks, and after so many steps."""
-    most, found, steps, at_kink = max(1, NUMBERS_OF_A_CALL // size), list[tuple[float, float, float, float]](), 0, True
+    intervals: Iterator[tuple[float, float, int]], outputs: set[float], kinks: set[float], turns: set[float], size: int
+) -> Generator[Array, None, None]:
+    """Yield intervals as `Engine.advance` takes them, some at once.
+
+    They are cut in front of the second kink (what the first one does is the start of the run), where another method begins
+    (``turns``), and after so many steps.
+    """
+    most, found, steps, passed = max(1, NUMBERS_OF_A_CALL // size), list[tuple[float, float, float, float]](), 0, 0
     for start, end, count in intervals:
-        if found and (start in landings or steps + count > most):
-            yield at_kink, np.array(found)
-            found, steps, at_kink = [], 0, start in landings
-        done = 0
+        is_kink = start in kinks
+        passed += is_kink
+        if found and (start in turns or steps + count > most or (is_kink and passed == 2)):
+            yield np.array(found)
+            found, steps = [], 0
+        kind, done = float(at.BEGINS_AT_KINK * is_kink), 0
         while count - done > most:  # an interval of its own, in parts
             middle = start + (end - start) * ((done + most) / count)
-            yield at_kink, np.array([(start + (end - start) * (done / count), middle, most, 0.0)])
-            done, at_kink = done + most, False
+            yield np.array([(start + (end - start) * (done / count), middle, most, kind)])
+            done, kind = done + most, 0.0
         first = start + (end - start) * (done / count) if done else start
-        found.append((first, end, count - done, float(end in outputs)))
+        found.append((first, end, count - done, kind + at.ENDS_AT_OUTPUT * (end in outputs)))
         steps += count - done
     if found:
-        yield at_kink, np.array(found)
+        yield np.array(found)

@@ -292,8 +292,8 @@ def take_step(arrays, t, h, until, is_last, is_output):
 def run_steps(arrays):
     """Take the steps of smooth intervals; returns how it ended (`names`: DONE, FAILED, EVENT, DIVERGED).
 
-    ``INTERVALS``: start and end [s], number of steps, whether the end is an output (I, 4). ``CURSOR``: interval, step in it, rows
-    of the record so far, and whether the first step's start is an output too (4,); where the call stopped.
+    ``INTERVALS``: start and end [s], number of steps, ENDS_AT_OUTPUT + BEGINS_AT_KINK (I, 4). ``CURSOR``: interval, step in it,
+    rows of the record so far, and whether the first step's start is an output too (4,); where the call stopped.
     """
     intervals, cursor, axial = floats_2(arrays, ix.INTERVALS), integers_1(arrays, ix.CURSOR), floats_1(arrays, ix.AXIAL_STATE)
     if axial[ix.LANDED] == 0.0:
@@ -303,13 +303,15 @@ def run_steps(arrays):
         begin_step(arrays, axial[ix.NOW], max(axial[ix.LAST_LENGTH], np.finfo(np.float64).tiny))
     while cursor[0] < intervals.shape[0]:
         interval = intervals[cursor[0]]
-        steps = int(interval[2])
+        steps, kind = int(interval[2]), int(interval[3])
         h = (interval[1] - interval[0]) / steps
+        if kind >= ix.BEGINS_AT_KINK and cursor[1] == 0:
+            axial[ix.LANDED] = ix.KINK
         while cursor[1] < steps:
             is_last = cursor[1] + 1 == steps
             t = interval[0] + cursor[1] * h
             until = interval[1] if is_last else interval[0] + (cursor[1] + 1) * h
-            status = take_step(arrays, t, h, until, is_last, is_last and interval[3] != 0.0)
+            status = take_step(arrays, t, h, until, is_last, is_last and kind % 2 == ix.ENDS_AT_OUTPUT)
             if status != ix.DONE:
                 return status
             cursor[1] += 1

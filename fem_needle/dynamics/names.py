@@ -222,6 +222,7 @@ LATERAL, AXIAL_STATE, LEDGER_STATE, HELD, PATH_EDGES, PATH_CUBICS, PATH_MOMENTS,
 ) = range(50, 83)
 # A call.
 INTERVALS, CURSOR, LIMITS, RECORDS = range(83, 87)
+ENDS_AT_OUTPUT, BEGINS_AT_KINK = 1, 2  # of an interval, added
 # A model that is asked: its address, what it answers. Directions that a model resolves, how many, and work space.
 ASKED, ANSWERED, ANSWERED_LOAD, SUBSPACE, RANKS, REDUCED, REDUCED_VALUES, REDUCED_WORK = range(87, 95)
 ARRAYS = 95

@@ -22,12 +22,16 @@ class Part:
         that need not follow them; "cosines": eigenvectors once, no steps.
     reason
         Why.
+    moved
+        How far inertia moves the tip there at most, relative to its largest deflection, but for vibrations that the tissue damps
+        before they are seen; 0 where that was not looked at.
     """
 
     begin: float
     end: float
     how: str
     reason: str
+    moved: float = 0.0
 
 
 def part_at(parts: Sequence[Part], time: float) -> Part:

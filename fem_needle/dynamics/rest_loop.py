@@ -201,12 +201,14 @@ def run_rests(arrays):
         axial[ix.LANDED] = ix.CONTINUED
     while cursor[0] < intervals.shape[0]:
         interval = intervals[cursor[0]]
-        steps = int(interval[2])
+        steps, kind = int(interval[2]), int(interval[3])
         h = (interval[1] - interval[0]) / steps
+        if kind >= ix.BEGINS_AT_KINK and cursor[1] == 0:
+            axial[ix.LANDED] = ix.KINK
         while cursor[1] < steps:
             is_last = cursor[1] + 1 == steps
             until = interval[1] if is_last else interval[0] + (cursor[1] + 1) * h
-            status = take_rest(arrays, interval[0] + cursor[1] * h, h, until, is_last and interval[3] != 0.0)
+            status = take_rest(arrays, interval[0] + cursor[1] * h, h, until, is_last and kind % 2 == ix.ENDS_AT_OUTPUT)
             if status != ix.DONE:
                 return status
             cursor[1] += 1

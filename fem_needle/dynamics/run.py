@@ -108,9 +108,7 @@ def _moved(plant: Plant, integration: Integration, grid: TimeGrid) -> Generator[
     kinks, turns = {0.0, *grid.landings}, {part.begin for part in integration.parts}
     until = cosines_from(integration.parts)
     steps = (interval for interval in grid.intervals() if interval[0] < until)
-    for at_kink, intervals in smooth_stretches(steps, set(grid.outputs), kinks | turns, plant.size):
-        if at_kink:
-            engine.land()
+    for intervals in smooth_stretches(steps, set(grid.outputs), kinks, turns, plant.size):
         engine.use(integration.method_at(float(intervals[0, 0])))
         status, samples = engine.advance(intervals, counted=not first, from_start=first)
         first = False

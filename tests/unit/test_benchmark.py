@@ -22,7 +22,7 @@ from fem_needle.benchmark.record import read_record, write_record
 from fem_needle.benchmark.reference import growing_beam, reference_tips, stored
 from fem_needle.benchmark.result import Row
 from fem_needle.benchmark.rivals import load_rivals
-from fem_needle.benchmark.scaling import scaling
+from fem_needle.benchmark.scaling import Sizes, scaling
 from fem_needle.benchmark.study import benchmark
 from fem_needle.benchmark.timing import SHORTEST, take_turns
 from fem_needle.errors import NeedleError, SceneError
@@ -252,8 +252,11 @@ def test_wrong_input_is_told(command_line, arguments, message):
 def test_the_scaling_has_times_and_memory(monkeypatch):
     monkeypatch.setattr("fem_needle.benchmark.scaling.STEPS", 10)
     monkeypatch.setattr("fem_needle.benchmark.scaling.NAIVE_STEPS", 10)
-    rows = scaling((10,), (0.02,))
-    assert [(one.over, one.size) for one in rows] == [("elements", 10), ("elements", 10), ("duration", 0.02)]
+    rows = scaling(Sizes((10,), (0.02,), (20,), (30,), (2,)))
+    assert [(one.over, one.size) for one in rows] == [
+        ("elements", 10), ("elements", 10), ("duration", 0.02), ("pieces of a cut path", 20), ("points of a table", 30),
+        ("runs", 2),
+    ]  # fmt: skip
     assert all(one.per_step and one.memory for one in rows)
 
 
