@@ -36,8 +36,8 @@ def figures(study: Benchmark, name: str) -> str:
     if study.goals:
         parts += ["Goals:\n", _goals(study)]
     if study.scaling:
-        size = "over elements: 400 steps, 50 with scikit-fem; over duration: 40 elements"
-        parts += [f"Scaling of M, steps of 1 ms ({size}):\n", _scaling(study.scaling)]
+        size = "over elements: 400 steps, 50 with scikit-fem; over duration: 40 elements; else 8 elements"
+        parts += [f"Scaling, steps of 1 ms ({size}):\n", _scaling(study.scaling)]
     return "\n".join(parts)
 
 

@@ -91,7 +91,8 @@ def test_observer():
 
 
 @pytest.mark.parametrize("time_step", [1e-3, "auto"])
-def test_an_interrupt_keeps_what_was_computed(time_step):
+def test_an_interrupt_keeps_what_was_computed(time_step, monkeypatch):
+    monkeypatch.setattr("fem_needle.dynamics.engine.NUMBERS_OF_A_CALL", 200)  # an interrupt waits for the end of a call
     watcher = Watcher(stop_at=0.5)
     run = simulate(plant(), time_step=time_step, analysis="dynamic", output_step=0.01, observer=watcher)
     assert run.summary["stop_reason"] == "interrupted"
