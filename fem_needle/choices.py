@@ -9,7 +9,7 @@ from math import inf, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.dynamics.parts import COSINES, PASSED_OVER, Part
+from fem_needle.dynamics.parts import COSINES, FOLLOWED, PASSED_OVER, Part
 from fem_needle.dynamics.push import run_limits
 from fem_needle.dynamics.rests import tips_at_rest
 from fem_needle.dynamics.vibration import needs_no_steps, vibrating_tips
@@ -50,8 +50,8 @@ class Choice:
     inertia_error
         Bound on what leaving out inertia, or vibrations, costs the tip, relative to its largest deflection.
     vibration
-        How far inertia moves the tip at most, relative to its largest deflection, vibrations that the tissue damps at once left
-        out; 1 where that was not looked at.
+        How far inertia moves the tip at most, relative to its largest deflection, but for vibrations that steps pass over; 1
+        where that was not looked at.
     parts
         How the needle gets through the parts of the run.
     """
@@ -90,7 +90,8 @@ def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:
     parts = parts_with_inertia(scene, effect, step)
     if parts[0].how == COSINES:
         skipped = (*skipped, Skipped("time steps", parts[0].reason))
-    return Choice("dynamic", step, skipped, _unresolved(scene, effect, parts), min(effect.lasting, 1.0), parts)
+    vibration = max([effect.lasting, *(part.moved for part in parts if part.how == FOLLOWED)])
+    return Choice("dynamic", step, skipped, _unresolved(scene, effect, parts), min(vibration, 1.0), parts)
 
 
 def _effect(scene: Scene, pilot: Callable[[], Plant]) -> Inertia:

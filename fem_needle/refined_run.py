@@ -34,6 +34,7 @@ TIME_ORDER = 4.0  # of the integrator with a spectral radius of 1, otherwise 3
 LEAST_FINER = 1.3  # times as many elements: a mesh to compare with
 SURE_ORDER = 3.0  # of the mesh's error in motion, at least
 MESH_ORDER = 5.0  # of the mesh's error in motion, to guess the elements that are needed
+MUCH_LONGER = 2.5  # ratio of steps
 LEAST_REFINEMENT = 0.7  # largest ratio of successive steps
 SHORTEST = 0.33  # smallest ratio of successive steps
 
@@ -89,11 +90,14 @@ class _Search:
         All runs so far, the one that is delivered last.
     error
         Estimated time error of the last run, relative to the largest tip deflection; None before the final run.
+    detuned
+        What the mesh costs vibrations, as far as meshes were not compared for it.
     """
 
     job: Job
     trials: list[_Trial]
     error: float | None = None
+    detuned: float = 0.0
 
     @property
     def tolerance(self) -> float:
@@ -180,19 +184,24 @@ def _better_mesh(search: _Search, trial: _Trial) -> _Trial | None:
     return other if wanted is finer else search.run(search.job, trial.step)
 
 
-def _follows_vibrations(search: _Search, swing: float) -> bool:
-    """Return whether the mesh is fine enough for vibrations as large as the difference of the two coarsest runs."""
+def _lost_to_mesh(search: _Search, swing: float) -> float:
+    """Return what the mesh costs vibrations of a size (relative to the largest tip), infinite where that has to be seen."""
     chosen = search.job.chosen
     finer = None if chosen.ladder is None else chosen.ladder.finer(chosen.plant, LEAST_FINER)
     if finer is None or resolving_step(search.job) == inf:
-        return True
+        return 0.0
     if search.job.scene.initial.shape != "equilibrium":  # let go: what the mesh does to a shape shows as it swings
-        return False
-    return swing * detuning(chosen.plant, finer) <= MESH_SHARE * search.tolerance
+        return inf
+    return swing * detuning(chosen.plant, finer)
 
 
 def _settle_vibrations(search: _Search, coarser: _Trial, final: _Trial) -> None:
-    """Compare meshes with a step that follows the vibrations, and run again on a finer one where they differ."""
+    """Compare meshes with a step that follows the vibrations, and run again on a finer one where they differ.
+
+    Steps that are much longer than the last ones do not follow the faster vibrations, which the mesh makes wrong first.
+    """
+    if coarser.step > MUCH_LONGER * final.step:
+        coarser = final
     first = coarser
     for _ in range(MOST_MESHES):
         better = _better_mesh(search, coarser)
@@ -226,8 +235,11 @@ def _find_step(search: _Search, first: _Trial) -> None:
         expected = expectation([run.step for run in runs], differences, order, resolved=resolved)
         search.error = expected.bound
         if search.error <= search.allowed and runs[-1].is_whole:
-            if not _follows_vibrations(search, max(differences[0], search.job.choice.vibration)):
+            lost = _lost_to_mesh(search, max(differences[0], search.job.choice.vibration))
+            if lost > MESH_SHARE * search.tolerance:
                 _settle_vibrations(search, *runs[-2:])
+            else:
+                search.detuned = lost
             return
         ratio = next_ratio(expected, AIM * search.allowed)
         if len(search.trials) >= MOST_RUNS or runs[-1].end.steps / ratio > MOST_STEPS:
@@ -301,7 +313,7 @@ def _show(search: _Search) -> Trajectory:
     begin(job, grid)
     run = replace(trajectory_of(job, grid, samples, None, trial.end), course=course)
     if search.error is not None:
-        run.summary["error_estimate"] = total_error(search.job, search.error)
+        run.summary["error_estimate"] = total_error(search.job, search.error + search.detuned)
     if search.error is not None and search.error > search.allowed:
         run.summary["warnings"].append(
             f"the tolerance {search.tolerance:g} was not reached with {trial.end.steps} steps: see error_estimate"

@@ -25,6 +25,7 @@ FEWEST_SAMPLES = 50  # of a finer run: instants at which runs are compared
 STEPS_PER_LOAD_PERIOD = 4  # of the coarsest trial run
 STEPS_PER_NATURAL_PERIOD = 1.5  # with which vibrations are resolved
 DAMPED_STEPS_PER_PERIOD = 24.0  # the same of a method that damps vibrations: longer steps agree that nothing vibrates
+PARTS_STEPS_PER_PERIOD = 8.0  # where vibrations are followed in parts of a run
 LEAST_TURN = 2.25  # that an unresolved vibration must appear to turn over the coarsest run, in rad: differences then show it
 APPARENT = 12.0  # an unresolved vibration appears to turn by 12 / (omega h) in a step
 
@@ -77,14 +78,17 @@ def coarsest_step(job: Job) -> float:
 
 
 def _following_step(job: Job) -> float:
-    """Return the longest step [s] of a first run that shows the vibrations in parts of a run in which they are followed."""
+    """Return the longest step [s] of a first run that shows the vibrations in parts of a run in which they are followed.
+
+    Where they are followed in parts alone these may be too short for vibrations to turn by the least angle: they are resolved.
+    """
     resolving = resolving_step(job)
     if resolving == inf or not is_undamped(job):
         return resolving
-    parts = job.choice.parts
-    duration = sum(part.end - part.begin for part in parts if part.how == FOLLOWED) or likely_duration(job.scene)
+    if is_passing(job):
+        return resolving * STEPS_PER_NATURAL_PERIOD / PARTS_STEPS_PER_PERIOD
     frequency = 2 * pi / (STEPS_PER_NATURAL_PERIOD * resolving)
-    return max(resolving, sqrt(APPARENT * duration / (LEAST_TURN * frequency)))
+    return max(resolving, sqrt(APPARENT * likely_duration(job.scene) / (LEAST_TURN * frequency)))
 
 
 def sampled_grid(job: Job, step: float) -> TimeGrid:
