@@ -1,8 +1,11 @@
-"""How long and how large a run may be: what no machine finishes or holds is refused before anything is allocated."""
+"""What is refused before anything is computed: runs that no machine finishes or holds, places that are not on the needle."""
 
 from __future__ import annotations
 
 from math import isfinite
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from fem_needle.errors import SceneError
 
@@ -12,8 +15,27 @@ MOST_BYTES = 4_000_000_000  # of all samples together
 MOST_READINGS = 1_000_000  # of a sensor or a controller
 MOST_REPETITIONS = 100_000
 
+BESIDE = 1e-9  # of the length: what rounding may put a station beside the needle
+
 _BYTES_OF_SAMPLE = 2000  # besides coordinates and stations
 _COPIES = (2, 3)  # of the coordinates and of the deflections at the stations, while a run is collected
+
+
+def stations_on(arc_length: ArrayLike, length: float) -> NDArray[np.float64]:
+    """Return stations from the hub, 0, to the tip [m], each of which is on the needle.
+
+    Raises
+    ------
+    SceneError
+        With the first that is not; where it would be in mm, this is said.
+    """
+    stations = np.asarray(arc_length, dtype=float)
+    outside = ~((stations >= -BESIDE * length) & (stations <= (1.0 + BESIDE) * length))
+    if np.any(outside):
+        first = float(stations[outside].flat[0])
+        hint = f"; {first:g} mm would be {1e-3 * first:g}" if length < first <= 1e3 * length else ""
+        raise SceneError(f"arc_length: not on the needle (got {first:g} m; allowed 0, the hub, to {length:g} m, the tip{hint})")
+    return np.clip(stations, 0.0, length)
 
 
 def check_steps(duration: float, time_step: float) -> None:

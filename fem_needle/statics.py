@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fem_needle import banded
 from fem_needle.display import MILLIMETERS, Card, Shown
 from fem_needle.errors import ComputationError
+from fem_needle.limits import stations_on
 from fem_needle.loads import LoadCase, load_case
 from fem_needle.plant import Operators, Plant, Points
 
@@ -70,7 +71,8 @@ class Equilibrium(Shown):
 
     def deflection(self, arc_length: Array, derivative: int = 0) -> Array:
         """Return the deflection [m] (or a derivative by arc length) at stations from the hub, 0, to the tip, l [m]."""
-        return self.plant.deflection(self.coordinates, self.point_forces, self.depth, arc_length, derivative)
+        stations = stations_on(arc_length, self.plant.scene.needle.length)
+        return self.plant.deflection(self.coordinates, self.point_forces, self.depth, stations, derivative)
 
 
 def solve_static(plant: Plant, *, depth: float, time: float = 0.0) -> Equilibrium:

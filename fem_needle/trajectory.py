@@ -11,6 +11,7 @@ import scipy  # its parts are loaded where they are used
 from numpy.typing import NDArray
 
 from fem_needle.display import Card, Shown, in_millimeters, without_rounding
+from fem_needle.limits import stations_on
 from fem_needle.motion import wanted_radius
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
@@ -143,7 +144,7 @@ class Trajectory(Shown):
         """
         if arc_length is None and derivative == 0:
             return self.station_deflection
-        stations = self.arc_length if arc_length is None else np.asarray(arc_length, dtype=float)
+        stations = self.arc_length if arc_length is None else stations_on(arc_length, self.scene.needle.length)
         if self.plant is None or self.coordinates is None or self.point_forces is None:
             return np.stack([self._from_stations(row, stations, derivative) for row in range(len(self.time))])
         return self.plant.deflection(self.coordinates, self.point_forces, self.depth, stations, derivative)

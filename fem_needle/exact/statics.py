@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fem_needle.errors import SceneError
 from fem_needle.exact.matching import BeamProblem, BeamSolution, solve_beam
+from fem_needle.limits import stations_on
 from fem_needle.scene import Guide, LateralLoad, Scene, TipLoad
 from fem_needle.scene.time_functions import as_function
 
@@ -102,7 +103,7 @@ class PiecewiseStatics:
         return float(-self.scene.needle.bending_stiffness * self.solution.states[0, 2])
 
     def _derivative(self, arc_length: ArrayLike, order: int) -> NDArray[np.float64]:
-        station = np.asarray(arc_length, dtype=float)
+        station = stations_on(arc_length, self.scene.needle.length)
         y = np.ravel(station) - (self.scene.needle.length - self.depth)
         if self.solution is None:
             return np.zeros(station.shape)
