@@ -19,7 +19,7 @@ from fem_needle.plant import Plant
 from fem_needle.refined_run import run_refined
 from fem_needle.run_job import Job, Nobody, Observer, integration, run_live
 from fem_needle.scene import Scene
-from fem_needle.scene.settings import overriding
+from fem_needle.scene.settings import overriding, refuse_idle
 from fem_needle.threads import one_thread
 from fem_needle.trajectory import Trajectory
 
@@ -52,7 +52,7 @@ def run_scene(
     model
         "fem", "assumed-modes" or another installed model.
     modes, variant, basis, static_corrections
-        Of the assumed modes.
+        Of the assumed modes; refused where the model is "fem", which has none (``variant`` makes it fixed-frame).
     elements, degree
         Mesh; default: chosen from the tolerance.
     mesh
@@ -96,6 +96,7 @@ def run_scene(
         "numerics.output_step": output_step,
     }
     scene = scene.with_values(overriding({path: value for path, value in values.items() if value is not None}))
+    refuse_idle(scene.model.kind, values)
     started = clock.perf_counter()
     family = model_family(scene.model.kind)
     choice = choose(scene, lambda: family.pilot(scene))

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fem_needle.errors import SceneError
-from fem_needle.scene.settings import overriding
+from fem_needle.scene.settings import overriding, refuse_idle
 from fem_needle.scene.units import to_si
 
 if TYPE_CHECKING:
@@ -38,7 +38,9 @@ def changed(
     values = dict(first or {}) | dict(_assignment(text) for text in assignments)
     given = {path: value_of(text) if isinstance(text, str) else text for path, text in options.items() if text is not None}
     values |= overriding(given)
-    return scene.with_values(values) if values else scene
+    result = scene.with_values(values) if values else scene
+    refuse_idle(result.model.kind, given)
+    return result
 
 
 def value_of(text: str) -> Any:

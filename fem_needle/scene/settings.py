@@ -8,11 +8,12 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import StrictBool, StrictStr, model_validator
 
-from fem_needle.errors import SuspiciousValueWarning
+from fem_needle.errors import SceneError, SuspiciousValueWarning
 from fem_needle.scene.node_positions import NodePositions
 from fem_needle.scene.part import Mistake, Part, raise_mistakes
 from fem_needle.scene.quantity import Quantity
 
+OF_ASSUMED_MODES = ("model.modes", "model.basis", "model.static_corrections")  # without effect on another model
 FIXED_FRAME_VARIANTS = ("corrected", "as-printed")
 _STEP = Quantity("s", above=0.0, words=("auto",))
 
@@ -179,6 +180,21 @@ class Numerics(Part):
             message = f"numerics.loop = '{self.loop}': a setting of former versions; every needle goes through the same steps"
             warnings.warn(message, SuspiciousValueWarning, stacklevel=2)
         return self
+
+
+def refuse_idle(kind: str, given: Mapping[str, Any]) -> None:
+    """Refuse what was asked for by name, by path, and has no effect on a kind of model.
+
+    Raises
+    ------
+    SceneError
+        With every such setting, and the model that knows it.
+    """
+    idle = [path for path in OF_ASSUMED_MODES if kind == "fem" and given.get(path) not in {None, False}]
+    if idle:
+        raise SceneError(
+            [f"{path}: has no effect on the model 'fem' (got {given[path]!r}; give model 'assumed-modes' too)" for path in idle]
+        )
 
 
 def overriding(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -81,3 +81,15 @@ def test_python_refuses_impossible_models_too():
 def test_a_model_that_says_little_has_a_name():
     assert model_text({}) == "?"
     assert model_text({"model": "rope"}) == "rope"
+
+
+@pytest.mark.parametrize("setting", [{"modes": 2}, {"basis": "inserted-length"}, {"static_corrections": True}])
+def test_settings_of_modes_without_modes_are_refused(setting):
+    (name,) = setting
+    with pytest.raises(SceneError, match=f"model.{name}: has no effect on the model 'fem' .*assumed-modes"):
+        run_scene(load_scene("thesis"), **setting)
+
+
+def test_options_of_modes_without_modes_are_refused(run):
+    status, _, err = run("thesis", "--modes", "2", *FAST)
+    assert (status, "model.modes: has no effect on the model 'fem'" in err) == (2, True)
