@@ -12,6 +12,8 @@ from fem_needle.scene.listing import entries
 from fem_needle.scene.time_functions import Sinusoid, Table
 from fem_needle.scene.time_quantity import TimeValue, extremes
 
+EPOCH = 1e8  # s: three years
+FAST = 5.0  # m/s: no needle is that fast
 OLD_READINGS = 0.1  # a controller's period by that of the sensor it reads: below, it decides on old readings
 LONG_DELAY = 5.0  # a sensor's delay by the controller's period: above, several commands are on the way unseen
 
@@ -23,7 +25,7 @@ NOT_YOUNGS_MODULUS = (
 
 def suspicious(scene: Scene) -> tuple[str, ...]:
     """Return a message for each suspicious value; none for an ordinary scene."""
-    checks = (_units, _needle, _layers, _push, _tip_force, _times, _model, _sensors, _feedback)
+    checks = (_units, _needle, _layers, _push, _tip_force, _times, _tables, _model, _sensors, _feedback)
     return tuple(message for check in checks for message in check(scene))
 
 
@@ -52,8 +54,8 @@ def _units(scene: Scene) -> Iterator[str]:
             yield f"{path} = {largest:g} Pa < 1e6 Pa: looks like GPa"
         elif quantity.unit == "rad" and largest > 0.5:
             yield f"{path} = {largest:g} rad > 0.5 rad: looks like degrees"
-        elif quantity.unit == "m/s" and largest > 5.0:
-            yield f"{path} = {largest:g} m/s > 5 m/s: looks like mm/s"
+        elif quantity.unit == "m/s" and largest >= FAST:
+            yield f"{path} = {largest:g} m/s >= {FAST:g} m/s: looks like mm/s (or cm/s)"
 
 
 def _needle(scene: Scene) -> Iterator[str]:
@@ -163,6 +165,21 @@ def _times(scene: Scene) -> Iterator[str]:
             yield f"numerics.{name} = {step:g} s > {duration:g} s, the duration of the run"
         elif isinstance(step, float) and step < 1e-9 * duration:
             yield f"numerics.{name} = {step:g} s < 1e-9 times {duration:g} s, the duration: a very long run"
+
+
+def _tables(scene: Scene) -> Iterator[str]:
+    """Look for tables whose times are not those of the run."""
+    duration = scene.duration or inf
+    for path, value, _ in entries(scene):
+        if not isinstance(value, Table):
+            continue
+        seen = sum(0.0 <= time <= duration for time in value.time)
+        if value.time[0] > EPOCH:
+            yield f"{path}.time begins at {value.time[0]:.10g} s > {EPOCH:g} s: looks like seconds since 1970, not since the start"
+        elif seen < 2 <= len(value.time):
+            what = "none" if seen == 0 else "one"
+            points = f"{what} of its {len(value.time)} points in the run, 0 to {duration:g} s"
+            yield f"{path}.time has {points}: looks like another unit of time"
 
 
 def _sensors(scene: Scene) -> Iterator[str]:
