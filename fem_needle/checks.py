@@ -175,7 +175,7 @@ def _tables(scene: Scene) -> Iterator[str]:
             continue
         seen = sum(0.0 <= time <= duration for time in value.time)
         if value.time[0] > EPOCH:
-            yield f"{path}.time begins at {value.time[0]:.10g} s > {EPOCH:g} s: looks like seconds since 1970, not since the start"
+            yield f"{path}.time begins at {value.time[0]:.10g} s > {EPOCH:g} s: looks like seconds since 1970, not the start"
         elif seen < 2 <= len(value.time):
             what = "none" if seen == 0 else "one"
             points = f"{what} of its {len(value.time)} points in the run, 0 to {duration:g} s"

@@ -219,14 +219,15 @@ def add_sums(piece, factor, sums, kind, matrix):
 def add_up_to(x, k, c, frame, nodes, coef, quad, sums, shape, matrices):
     """Add k and c times the integrals from the start of the line to a place to the tissue matrices (4, n, n)."""
     piece = locate(nodes, x)
-    if x >= nodes[piece + 1]:
+    ends = x >= nodes[piece + 1]  # by rounding also beyond the last node
+    if ends:
         piece += 1
     add_sums(piece, k, sums, ix.UNIT_MASS, matrices[ix.TISSUE])
     if c != 0.0:
         add_sums(piece, c, sums, ix.UNIT_MASS, matrices[ix.DAMPING])
         add_sums(piece, c, sums, ix.UNIT_DRAG, matrices[ix.DRAG])
         add_sums(piece, c, sums, ix.UNIT_SLIP, matrices[ix.SLIP])
-    if x > nodes[piece]:
+    if not ends and x > nodes[piece]:
         add_part(nodes[piece], x, piece, k, c, 1 if frame == ix.STRETCHED else 0, coef, nodes, quad, shape, matrices)
 
 

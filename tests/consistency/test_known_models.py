@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fem_needle import FiniteElementNeedle, simulate
+from fem_needle.dynamics.rests import tips_at_rest
 from fem_needle.scene import TipLoad
 from reduced_model import AssumedModeNeedle, mode_basis, project
 from tests.consistency.scenes import BUZZ, LAYERS, held, moving, scene_of
@@ -46,3 +47,12 @@ def test_columns_that_stay_are_not_asked_for(name):
         runs.append(simulate(plant, analysis=analysis, **settings))
     compiled, asked = runs
     assert np.max(np.abs(compiled.tip_deflection - asked.tip_deflection)) < 1e-9 * np.max(np.abs(asked.tip_deflection))
+
+
+@pytest.mark.parametrize("modes", [2, 5])
+def test_a_depth_beyond_the_length_by_rounding(modes):
+    """A commanded speed arrives at the whole length only to rounding; what lies behind the last piece is not the needle's."""
+    scene = scene_of("entry", held(0.12), layers=LAYERS, loads=(TipLoad(force=0.1),))
+    plant = AssumedModeNeedle(scene, modes=modes)
+    whole, beyond = tips_at_rest(plant, [(0.0, scene.needle.length), (1.0, scene.needle.length * (1.0 + 1e-15))])
+    assert beyond == pytest.approx(whole, rel=1e-9)
