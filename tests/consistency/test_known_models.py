@@ -52,7 +52,7 @@ def test_columns_that_stay_are_not_asked_for(name):
 @pytest.mark.parametrize("modes", [2, 5])
 def test_a_depth_beyond_the_length_by_rounding(modes):
     """A commanded speed arrives at the whole length only to rounding; what lies behind the last piece is not the needle's."""
-    scene = scene_of("entry", held(0.12), layers=LAYERS, loads=(TipLoad(force=0.1),))
+    scene = scene_of("entry", held(0.12), loads=(TipLoad(force=0.1),))
     plant = AssumedModeNeedle(scene, modes=modes)
     whole, beyond = tips_at_rest(plant, [(0.0, scene.needle.length), (1.0, scene.needle.length * (1.0 + 1e-15))])
     assert beyond == pytest.approx(whole, rel=1e-9)
