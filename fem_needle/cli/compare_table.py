@@ -67,12 +67,12 @@ def _at_rest(comparison: Comparison) -> Iterator[Row]:
     for index, depth in enumerate(comparison.depths):
         yield f"at rest at {1e3 * depth:.4g} mm:", *("" for _ in comparison.answers)
         yield "  tip [mm]", *(f"{1e3 * _chosen(answer).tips[index]:.5g}" for answer in comparison.answers)
-        yield "  tip error", "", *(_percent(_still(model).tip[index]) for model in comparison.models)
-        yield "  shape error", "", *(_percent(_still(model).shape[index]) for model in comparison.models)
+        yield "  tip error, of the tip there", "", *(_percent(_still(model).tip[index]) for model in comparison.models)
+        yield "  shape error, of the shape there", "", *(_percent(_still(model).shape[index]) for model in comparison.models)
         for number, frequency in enumerate(truth.frequencies[index].tolist()):
             cells = (_frequency(model, index, number) for model in comparison.models)
             yield f"  natural frequency {number + 1} [Hz]", f"{frequency / (2 * pi):.5g}", *cells
-    yield _errors(comparison, "largest tip error at rest", _largest_at_rest)
+    yield _errors(comparison, "largest tip error at rest, of the tip there", _largest_at_rest)
 
 
 def _largest_at_rest(model: ComparedModel) -> str:
@@ -120,13 +120,15 @@ def _in_the_run(comparison: Comparison) -> Iterator[Row]:
     yield "in the run:", *("" for _ in known)
     yield "  ends", *(f"{1e3 * run.run.depth[-1]:.4g} mm, {run.run.time[-1]:.4g} s" for run in known)
     yield "  tip at the end [mm]", *(f"{_last_tip(run.run):.5g}" for run in known)
-    yield _errors(comparison, "  largest tip error", lambda model: _run_percent(model, _moving(model).largest_tip))
-    yield _errors(comparison, "  largest shape error", lambda model: _run_percent(model, float(_moving(model).shape.max())))
+    tips = (_run_percent(model, _moving(model).largest_tip) for model in comparison.models)
+    shapes = (_run_percent(model, float(_moving(model).shape.max())) for model in comparison.models)
+    yield "  largest tip error, of the largest tip", "", *tips
+    yield "  largest shape error, of the largest shape", "", *shapes
     if comparison.scene.insertion.kind == "force":
         yield _errors(comparison, "  depth error [mm]", lambda model: f"{1e3 * _moving(model).depth_difference:.2g}")
     for name in _ENERGIES:
         cells = (_run_percent(model, _moving(model).energies[f"{name}_energy"]) for model in comparison.models)
-        yield f"  {name} energy error", "", *cells
+        yield f"  {name} energy error, of the largest total", "", *cells
     yield "  energy residual", *(f"{run.run.summary['relative_energy_residual']:.1e}" for run in known)
 
 

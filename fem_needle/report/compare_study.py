@@ -61,17 +61,26 @@ def _rest_grids(data: dict[str, Any]) -> tuple[Grid, ...]:
 def _figures(reference: dict[str, Any], models: list[dict[str, Any]]) -> Grid:
     """Return errors and cost, a column for each model."""
     rows = [("unknowns", *(str(one["unknowns"]) for one in (reference, *models)))]
-    rows.append(("largest tip error at rest", "", *(_nested(one, "largest_errors_at_rest", "tip") for one in models)))
+    at_rest = (_nested(one, "largest_errors_at_rest", "tip") for one in models)
+    rows.append(("largest tip error at rest, of the tip there", "", *at_rest))
     for key in ("tip", "shape", "bending_energy", "tissue_energy", "total_energy"):
-        rows.append((f"{key.replace('_', ' ')} error in the run", "", *(_nested(one, "run_errors", key) for one in models)))
+        norm = "largest total energy" if "energy" in key else f"largest {key}"
+        in_run = (_nested(one, "run_errors", key) for one in models)
+        rows.append((f"{key.replace('_', ' ')} error in the run, of the {norm}", "", *in_run))
     for key, name in (("static", "at rest"), ("run", "of the run")):
-        rows.append((f"speed-up {name}", "1", *(number((one.get("speed_up") or {}).get(key), 2) for one in models)))
+        rows.append((f"time {name} beside the reference's", "1", *(_beside(one, key) for one in models)))
     equals = [one.get("equal_elements") or {} for one in models]
     if any(equals):
         rows.append(("cheapest elements as right", "", *(str(one.get("elements", "none")) for one in equals)))
         rows.append(("time beside theirs", "", *(number(one.get("factor"), 2) for one in equals)))
     headers = ("", *(str(one["label"]) for one in (reference, *models)))
     return Grid("Largest errors and cost", headers, tuple(rows))
+
+
+def _beside(one: dict[str, Any], key: str) -> str:
+    """Return a model's time by the reference's: above 1 it is slower."""
+    faster = (one.get("speed_up") or {}).get(key)
+    return number(1.0 / faster if faster else None, 2)
 
 
 def _nested(one: dict[str, Any], table: str, key: str) -> str:

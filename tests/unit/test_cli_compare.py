@@ -46,8 +46,8 @@ def test_a_comparison_leaves_files_that_agree_with_the_table(compare, tmp_path):
         at_rest, in_run = ([float(row[f"tip_error_{name} [1]"]) for row in part] for part in parts)
         assert model["largest_errors_at_rest"]["tip"] == np.max(np.abs(at_rest))
         assert model["run_errors"]["tip"] == model["largest_tip_error"] == np.max(np.abs(in_run))
-        assert rows["tip error"][index] == f"{100 * model['errors_at_rest'][0]['tip']:.3g} %"
-        assert rows["largest tip error"][index] == f"{100 * model['run_errors']['tip']:.3g} %"
+        assert rows["tip error, of the tip there"][index] == f"{100 * model['errors_at_rest'][0]['tip']:.3g} %"
+        assert rows["largest tip error, of the largest tip"][index] == f"{100 * model['run_errors']['tip']:.3g} %"
         (first,) = model["ranges"]
         assert rows["within 0.01 % at rest: depth [mm]"][index] == f"{1e3 * first['start']:.1f} to {1e3 * first['end']:.1f}"
     assert data["models"][0]["ranges"][0]["end"] < 0.05 < data["models"][1]["ranges"][0]["end"]
