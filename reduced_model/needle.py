@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fem_needle import banded
 from fem_needle.beam_matrices import Beam, stretched_part, whole_needle
 from fem_needle.beam_needle import BeamNeedle
-from fem_needle.dynamics.resolve import RESOLUTION
+from fem_needle.dynamics.resolve import RESOLUTION, ROUNDED
 from fem_needle.errors import SceneError
 from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
 from fem_needle.plant import Operators
@@ -164,5 +164,6 @@ def resolved_directions(bending: Array, mass: Array) -> Array:
     eigenvalues = np.maximum(eigenvalues, np.finfo(float).tiny)
     directions = scale[:, None] * vectors / np.sqrt(eigenvalues)
     masses = np.einsum("ij,ik,kj->j", directions, mass, directions)
-    kept = eigenvalues * masses > RESOLUTION * eigenvalues[-1] * masses[-1]
+    is_known = eigenvalues > ROUNDED * eigenvalues[-1]
+    kept = is_known & (eigenvalues * masses > RESOLUTION * eigenvalues[-1] * masses[-1])
     return np.asarray(directions[:, kept], dtype=float)

@@ -14,6 +14,7 @@ from fem_needle.dynamics.arrays import floats_2, floats_3, floats_5, integers_1
 from fem_needle.dynamics.compilation import inner
 
 RESOLUTION = 1e-12  # rounding leaves the mass of what is kept right to 2e-4: below the usual tolerance
+ROUNDED = 1e-15  # of the largest eigenvalue: what is below is nothing but rounding
 MOST_SWEEPS = 30
 DIAGONAL = 1e-32  # of the squares of the entries: what is left beside the diagonal
 SMALLEST = 2.2250738585072014e-308
@@ -91,7 +92,8 @@ def resolve(arrays, at):
     enough = RESOLUTION * scaled[largest, largest] * direction_mass(mass, clamped, directions, largest, n)
     rank = 0
     for j in range(n):
-        if scaled[j, j] * direction_mass(mass, clamped, directions, j, n) > enough:
+        is_known = scaled[j, j] > ROUNDED * scaled[largest, largest]
+        if is_known and scaled[j, j] * direction_mass(mass, clamped, directions, j, n) > enough:
             for i in range(n):
                 directions[clamped + i, rank] = directions[clamped + i, j]
             rank += 1

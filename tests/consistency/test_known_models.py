@@ -5,7 +5,11 @@ import pytest
 
 from fem_needle import FiniteElementNeedle, simulate
 from fem_needle.dynamics.rests import tips_at_rest
+from fem_needle.models import build_plant
 from fem_needle.scene import TipLoad
+from fem_needle.stress.draws import random_numbers
+from fem_needle.stress.numbers import SI
+from fem_needle.stress.numbers import scene_of as scene_of_numbers
 from reduced_model import AssumedModeNeedle, mode_basis, project
 from tests.consistency.scenes import BUZZ, LAYERS, held, moving, scene_of
 
@@ -56,3 +60,11 @@ def test_a_depth_beyond_the_length_by_rounding(modes):
     plant = AssumedModeNeedle(scene, modes=modes)
     whole, beyond = tips_at_rest(plant, [(0.0, scene.needle.length), (1.0, scene.needle.length * (1.0 + 1e-15))])
     assert beyond == pytest.approx(whole, rel=1e-9)
+
+
+def test_many_modes_that_are_pulled_out_keep_finite_numbers():
+    """A random scene under stress: at 1e-6 of the length the bending of most combinations is nothing but rounding."""
+    scene = scene_of_numbers(random_numbers(381), SI).with_values({"model": {"kind": "assumed-modes", "modes": 8}})
+    run = simulate(build_plant(scene))
+    assert run.depth[-1] == 0.0
+    assert all(np.all(np.isfinite(values)) for values in run.series.values())
