@@ -11,6 +11,7 @@ from typing import Any
 MOST_ROWS = 25  # of a table
 LONGEST_TITLE = 60  # characters, in the short text
 SHORT_FACTS = 5  # facts in the short text
+SMALLEST_PUSH = 1e-5  # N
 MILLIMETERS = 1e3
 ROUNDING = 1e-12  # of the largest value of a kind: a smaller one is shown as 0
 
@@ -88,6 +89,11 @@ def in_millimeters(value: float | None, digits: int = 4) -> str:
 def without_rounding(value: float, largest: float) -> float:
     """Return a value, 0 where it is round-off beside the largest of its kind."""
     return 0.0 if abs(value) < ROUNDING * largest else value
+
+
+def in_newtons(force: float) -> str:
+    """Return a push with its unit; less than the hundredth of a millinewton, which nobody measures, is 0 N."""
+    return f"{0.0 if abs(force) < SMALLEST_PUSH else force:.4g} N"
 
 
 def columns_in_millimeters(columns: Mapping[str, Sequence[Any]]) -> dict[str, list[Any]]:

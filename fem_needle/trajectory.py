@@ -10,7 +10,7 @@ import numpy as np
 import scipy  # its parts are loaded where they are used
 from numpy.typing import NDArray
 
-from fem_needle.display import Card, Shown, in_millimeters, without_rounding
+from fem_needle.display import Card, Shown, in_millimeters, in_newtons, without_rounding
 from fem_needle.limits import stations_on
 from fem_needle.motion import wanted_radius
 from fem_needle.plant import Plant
@@ -124,7 +124,7 @@ class Trajectory(Shown):
         facts = [
             ("depth", f"{in_millimeters(float(self.depth[-1]))} at {self.time[-1]:.4g} s ({ending})"),
             ("tip", in_millimeters(without_rounding(float(self.tip_deflection[-1]), largest))),
-            ("push", f"{self.push_force[-1]:.4g} N"),
+            ("push", in_newtons(float(self.push_force[-1]))),
             ("analysis", f"{summary.get('analysis', 'unknown')}"),
             ("model", model),
             ("samples", str(len(self.time))),

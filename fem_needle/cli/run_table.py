@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fem_needle.display import without_rounding
+from fem_needle.display import in_newtons, without_rounding
 
 if TYPE_CHECKING:
     from fem_needle.trajectory import Trajectory
@@ -42,7 +42,7 @@ def run_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str]) -> It
     tip, largest = 1e3 * summary["final_tip_deflection"], 1e3 * summary["max_abs_tip_deflection"]
     tip = without_rounding(tip, largest)
     yield "tip deflection", f"{tip:.4g} mm (largest {largest:.4g} mm)"
-    yield "push force", f"{run.push_force[-1]:.4g} N"
+    yield "push force", in_newtons(float(run.push_force[-1]))
     yield "energy residual", f"{summary['relative_energy_residual']:.1e} of the largest lateral energy"
     yield from computation_rows(run, folder, known_warnings)
 
