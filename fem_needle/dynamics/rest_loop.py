@@ -193,7 +193,7 @@ def take_rest(arrays, t, h, until, is_output):
     return ix.DONE
 
 
-@entrance("equilibria", 90)
+@entrance("equilibria", 110)
 def run_rests(arrays):
     """Go through the equilibria of smooth intervals, as `fem_needle.dynamics.loop.run_steps` goes through steps."""
     intervals, cursor, axial = floats_2(arrays, ix.INTERVALS), integers_1(arrays, ix.CURSOR), floats_1(arrays, ix.AXIAL_STATE)

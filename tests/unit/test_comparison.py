@@ -232,13 +232,14 @@ def test_differences_by_zero_are_infinite_or_none():
 @pytest.mark.slow
 def test_a_run_that_ends_early_is_infinitely_wrong_and_says_so(monkeypatch):
     """A model that a push drives too fast agrees with the reference for as long as both go on: that is no agreement."""
-    real, calls = runs.simulate, []
+    real, calls = runs.run_along, []
 
-    def hasty(plant, **settings):
+    def hasty(plant, course, scene):
         calls.append(plant)
-        return real(plant if len(calls) < 2 else build_plant(plant.scene.with_value("insertion.push_force", 30.0)), **settings)
+        driven = plant if len(calls) < 2 else build_plant(plant.scene.with_value("insertion.push_force", 30.0))
+        return real(driven, course, driven.scene)
 
-    monkeypatch.setattr(runs, "simulate", hasty)
+    monkeypatch.setattr(runs, "run_along", hasty)
     found = compare(load_scene("thesis-open-loop").with_values(PUSHED), elements=8)
     (model,) = found.models
     assert model.run.largest_tip < found.largest_tip_error == np.inf
