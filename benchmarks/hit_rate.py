@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from fem_needle import FiniteElementNeedle, NeedleError, run_scene, simulate
+from fem_needle.finite_element_model import ELEMENT_CHOICES
 from tests.consistency.random_kinds import KINDS, kind_of, scene_of_seed
 from tests.consistency.random_scenes import OUTPUTS
 from tests.consistency.truth import Truth, true_rows
@@ -36,7 +37,6 @@ KNOWN = 0.3  # of the tolerance: what the truth may miss
 WANTED = KNOWN * 1e-5  # to which truths are refined
 UNKNOWN = "truth unknown"
 NEW = 100
-ELEMENTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 LONGER = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 
 
@@ -104,7 +104,7 @@ def cheapest(scene, run, truth, tolerance):
     count, longest = int(run.summary["elements"]), scene.duration / OUTPUTS
     step = min(run.summary["time_step"], longest)
     found = (run.summary["steps"], FiniteElementNeedle(scene, elements=count).size, count)
-    for fewer in reversed([number for number in ELEMENTS if number < count]):
+    for fewer in reversed([number for number in ELEMENT_CHOICES if number < count]):
         error, steps, size = tried(fewer, step)
         if error > tolerance:
             break

@@ -8,6 +8,7 @@ Derivation: docs/theory.md.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from fem_needle.foundation import Foundation
 from fem_needle.frames import Frame
 from fem_needle.loads import turns_with_needle
 from fem_needle.path import CutPath
-from fem_needle.plant import Operators, Points, RestTerms
+from fem_needle.plant import Operators, Plant, Points, RestTerms
 from fem_needle.row_blocks import row_blocks
 from fem_needle.scene import Guide, LateralLoad, Scene, as_function
 from fem_needle.shapes import Shapes
@@ -27,7 +28,32 @@ Array = NDArray[np.float64]
 SMALLEST_DEPTH_FRACTION = 1e-6  # of the length: below it the inserted part of an `entry` needle is dropped
 
 
-class BeamNeedle(ABC):
+class PolynomialNeedle(Plant):
+    """A plant whose shapes are polynomials that the compiled loop can integrate itself; a wrapper around one is none.
+
+    Attributes
+    ----------
+    shapes, frame
+        The functions w is made of, and where a position along the insertion axis lies on them.
+    foundation
+        Tells whether any tissue is viscous.
+    turns
+        Whether the hub's rotation is a coordinate.
+    is_polynomial
+        Whether the polynomials say all of it (`Plant.is_polynomial`).
+    nearly_dependent
+        Whether only some directions of the functions are told apart at a small depth.
+    """
+
+    shapes: Any
+    frame: Frame
+    foundation: Foundation
+    turns: bool
+    is_polynomial = True
+    nearly_dependent = False
+
+
+class BeamNeedle(PolynomialNeedle, ABC):
     """A beam on a foundation, a plant.
 
     Parameters
@@ -45,8 +71,6 @@ class BeamNeedle(ABC):
     axial_force_acts = True
     largest_spectral_radius = 1.0
     warnings: tuple[str, ...] = ()
-    is_polynomial = True
-    nearly_dependent = False
 
     def __init__(self, scene: Scene, shapes: Shapes, frame: Frame, beam: Beam) -> None:
         self.scene = scene

@@ -60,13 +60,13 @@ class Choice:
     output_step: float
     skipped: tuple[Skipped, ...]
     inertia_error: float
-    vibration: float = 1.0
-    parts: tuple[Part, ...] = ()
+    vibration: float
+    parts: tuple[Part, ...]
 
     @property
     def passes_over(self) -> bool:
         """Whether steps follow vibrations nowhere, because the tissue damps them: an L-stable method passes over them."""
-        return bool(self.parts) and all(part.how == PASSED_OVER for part in self.parts)
+        return all(part.how == PASSED_OVER for part in self.parts)
 
 
 def choose(scene: Scene, pilot: Callable[[], Plant]) -> Choice:

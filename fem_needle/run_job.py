@@ -9,8 +9,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from fem_needle.choices import Choice
-from fem_needle.collocation import collocation
-from fem_needle.dynamics.engine import DYNAMIC
 from fem_needle.dynamics.grid import RunEnd, TimeGrid, time_grid
 from fem_needle.dynamics.parts import COSINES
 from fem_needle.dynamics.run import VIBRATION, Integration, integration_of, run_samples, spectral_radius
@@ -139,12 +137,9 @@ def shown(job: Job, run: Trajectory, samples: Samples) -> Trajectory:
 def integration(job: Job) -> Integration:
     """Return how the needle gets from one time to the next."""
     parts = job.choice.parts
-    if parts and parts[0].how == COSINES:
+    if parts[0].how == COSINES:
         return Integration(VIBRATION)
-    if job.choice.passes_over:
-        return Integration(DYNAMIC, collocation(0.0))
-    found = integration_of(job.plant, job.scene, job.choice.analysis)
-    return replace(found, parts=parts) if len(parts) > 1 else found
+    return replace(integration_of(job.plant, job.scene, job.choice.analysis), parts=parts)
 
 
 def _warnings(job: Job) -> list[str]:

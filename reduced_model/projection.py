@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import FiniteElementNeedle, banded
+from fem_needle.beam_needle import PolynomialNeedle
 from fem_needle.path import CutPath
 from fem_needle.piecewise import PiecewisePolynomials
 from fem_needle.plant import Operators, Points, RestTerms
@@ -25,7 +26,7 @@ from reduced_model.needle import INDEPENDENT_MODES, STABLE_SPECTRAL_RADIUS, reso
 Array = NDArray[np.float64]
 
 
-class ProjectedNeedle:
+class ProjectedNeedle(PolynomialNeedle):
     """A needle on the columns of a basis, projected from finite elements.
 
     Parameters
@@ -42,7 +43,6 @@ class ProjectedNeedle:
     """
 
     axial_force_acts = True
-    nearly_dependent = False
 
     def __init__(self, needle: FiniteElementNeedle, basis: Basis) -> None:
         self.needle = needle
@@ -55,7 +55,7 @@ class ProjectedNeedle:
         parallel = basis.moves and basis.count > INDEPENDENT_MODES
         guided = any(guide.stiffness == "rigid" for guide in needle.scene.support.guides)
         self.largest_spectral_radius = STABLE_SPECTRAL_RADIUS if parallel or guided else 1.0
-        self.is_polynomial = not basis.moves
+        self.is_polynomial, self.shapes = not basis.moves, self
         self.frame, self.foundation, self.turns = needle.frame, needle.foundation, needle.turns
         self.warnings = needle.warnings
         self._rigid = np.column_stack([needle.straight(1.0, 0.0), needle.straight(0.0, 1.0)])
@@ -173,11 +173,6 @@ class ProjectedNeedle:
     def describe(self) -> dict[str, int | float | str]:
         """Return kind, number of columns and of elements."""
         return {"model": "projected", "modes": self.basis.count, "elements": self.needle.mesh.elements}
-
-    @property
-    def shapes(self) -> ProjectedNeedle:
-        """The functions that the columns are (`polynomials`)."""
-        return self
 
     def polynomials(self) -> PiecewisePolynomials | None:
         """Return 1, x and the columns as polynomials on the elements; None where the columns move with the depth."""

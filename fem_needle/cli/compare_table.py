@@ -155,7 +155,7 @@ def _equal(model: ComparedModel) -> str:
         return "none"
     count, factor = model.equal.elements, model.equal.factor
     noun = "element" if count == 1 else "elements"
-    return f"{count} {noun} ({_percent(model.equal.tip_error)}): the modes take {factor:.2g} x their time"
+    return f"{count} {noun} ({_percent(model.equal.tip_error)}): the model takes {factor:.2g} x their time"
 
 
 def _times(seconds: list[float]) -> Iterator[str]:

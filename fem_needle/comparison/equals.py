@@ -10,13 +10,13 @@ import numpy as np
 
 from fem_needle.comparison.at_rest import RestStates, StaticLoad, relative_difference, rest_states
 from fem_needle.comparison.runs import TimedRun, model_run, run_errors
+from fem_needle.finite_element_model import ELEMENT_CHOICES
 from fem_needle.models import build_plant
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene
 
 Answer = TypeVar("Answer", TimedRun, RestStates)
 
-COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 REPETITIONS = 3  # of both, in turn: the shortest time of each counts
 
 
@@ -77,7 +77,7 @@ def _equal(
     finest = scene.numerics.elements
     if not isinstance(finest, int) or scene.model.kind != "fem" or not np.isfinite(error):
         return None
-    for count in (count for count in COUNTS if count < finest):
+    for count in (count for count in ELEMENT_CHOICES if count < finest):
         plant = build_plant(scene.with_value("numerics.elements", count))
         missed = tip_error(answer(plant))
         if missed <= error:

@@ -7,17 +7,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import comb
-from typing import Any, Protocol, TypeGuard
+from typing import Any, TypeGuard
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.beam_needle import points_of
+from fem_needle.beam_needle import PolynomialNeedle, points_of
 from fem_needle.dynamics import names as at
 from fem_needle.dynamics.drive import bevel_of
-from fem_needle.foundation import Foundation
-from fem_needle.frames import Frame, MaterialFrame, StretchedFrame
+from fem_needle.frames import MaterialFrame, StretchedFrame
 from fem_needle.gauss import gauss_rule
 from fem_needle.piecewise import PiecewisePolynomials
 from fem_needle.plant import SMALLEST_COMPLIANCE, Plant
@@ -53,35 +52,13 @@ class Model:
         return self.arrays[at.SWITCH]
 
 
-class PolynomialNeedle(Plant, Protocol):
-    """A plant on polynomials, all of whose matrices follow from them (`Plant.is_polynomial`).
-
-    Attributes
-    ----------
-    shapes, frame
-        The functions w is made of, and where a position along the insertion axis lies on them.
-    foundation
-        Tells whether any tissue is viscous.
-    turns
-        Whether the hub's rotation is a coordinate.
-    nearly_dependent
-        Whether only some directions of the functions are told apart at a small depth.
-    """
-
-    shapes: Any
-    frame: Frame
-    foundation: Foundation
-    turns: bool
-    nearly_dependent: bool
-
-
 # Made once for each needle; gone with it.
 _CONSTANTS: WeakKeyDictionary[PolynomialNeedle, dict[int, NDArray[Any]]] = WeakKeyDictionary()
 
 
 def is_known(plant: Plant) -> TypeGuard[PolynomialNeedle]:
     """Return whether a plant's shapes are polynomials that say all of it: else the kernel asks it for its matrices."""
-    return plant.is_polynomial
+    return isinstance(plant, PolynomialNeedle) and plant.is_polynomial
 
 
 def model_of(plant: PolynomialNeedle, *, inertia: bool, viscous: bool = True) -> Model:

@@ -41,7 +41,7 @@ class Integration:
     method
         Collocation method of steps.
     parts
-        Of a run with inertia that is not the same throughout; steps over vibrations are Radau IIA's.
+        Of the run; in those with steps over vibrations the method is Radau IIA.
     """
 
     kind: str

@@ -20,7 +20,7 @@ from fem_needle.ledger import StepEnd
 from fem_needle.loads import is_steady, load_case, turns_with_needle
 from fem_needle.motion import depth_law, wanted_radius
 from fem_needle.plant import Plant
-from fem_needle.sample_arrays import Samples
+from fem_needle.sample_arrays import SINCE_START, Samples
 from fem_needle.scene import Scene
 from fem_needle.stages import StageSolution, evaluate_stage
 from fem_needle.statics import static_state
@@ -187,10 +187,7 @@ def vibration_samples(vibration: Vibration, times: Array) -> Samples:
     )
 
 
-_NEVER = (
-    "hub_work", "tissue_work", "tissue_dissipation", "boundary_energy", "friction_dissipation", "cutting_work", "push_work",
-    "arrest_loss", "axial_kinetic_energy",
-)  # fmt: skip
+_NEVER = ("axial_kinetic_energy", *(name for name in SINCE_START if name != "load_work"))
 
 
 def _products(band: Array, vectors: Array) -> Array:

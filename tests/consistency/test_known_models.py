@@ -1,5 +1,7 @@
 """Models that the kernel knows against the same models that it asks for their matrices: nearly dependent modes, fixed columns."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -68,3 +70,29 @@ def test_many_modes_that_are_pulled_out_keep_finite_numbers():
     run = simulate(build_plant(scene))
     assert run.depth[-1] == pytest.approx(0.0, abs=1e-15)
     assert all(np.all(np.isfinite(values)) for values in run.series.values())
+
+
+class Softer:
+    """Somebody's wrapper: a needle of everything that it does not say itself, in a tissue of half the stiffness."""
+
+    def __init__(self, needle):
+        self.needle = needle
+
+    def __getattr__(self, name):
+        return getattr(self.needle, name)
+
+    def operators(self, depth, time):
+        found = self.needle.operators(depth, time)
+        return replace(found, tissue=0.5 * found.tissue)
+
+
+def test_a_wrapper_is_asked_for_what_it_changes():
+    scene, _ = CASES["held"]
+    softer, soft = (
+        simulate(plant, time_step=1e-3, analysis="static", output_step=1e-2)
+        for plant in (
+            Softer(FiniteElementNeedle(scene, elements=4)),
+            FiniteElementNeedle(scene.with_value("tissue.stiffness_factor", 0.5), elements=4),
+        )
+    )
+    assert softer.tip_deflection == pytest.approx(soft.tip_deflection, rel=1e-9)

@@ -46,6 +46,10 @@ class Coefficients:
     momentum: np.ndarray
     force: np.ndarray
 
+    def part(self, where):
+        """The coefficients at some of the times."""
+        return Coefficients(*(getattr(self, name)[where] for name in self.__dataclass_fields__))
+
     def velocity(self, q, p, index=0):
         """q' that belongs to q and p."""
         return np.linalg.solve(self.mass[index], p - self.transport[index] @ q - self.momentum[index])

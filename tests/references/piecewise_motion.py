@@ -4,33 +4,17 @@ Where the tip stays beyond a layer's border for the rest of the run, the border 
 on both new pieces, so nothing is lost. So is the depth at which a cut path begins, where the rest line jumps.
 """
 
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
 from fem_needle.scene.time_functions import as_function
 from tests.references.cut_path import CutMemory
-from tests.references.gauss import GAUSS, RADAU, step_grid
+from tests.references.gauss import GAUSS, RADAU, Coefficients, step_grid
 from tests.references.piecewise_needle import PiecewiseNeedle, local_functions
 from tests.references.scenes import Loading
 
 ROOM = 0.003  # m between the tip and a border that becomes a break
-
-
-@dataclass(frozen=True)
-class Stages:
-    """Coefficients of p = M q' + B q + g, p' = D q' + E q + f at instants, own coordinates only."""
-
-    mass: np.ndarray
-    transport: np.ndarray
-    rate: np.ndarray
-    state: np.ndarray
-    momentum: np.ndarray
-    force: np.ndarray
-
-    def part(self, where):
-        return Stages(*(getattr(self, name)[where] for name in self.__dataclass_fields__))
 
 
 class Motor:
@@ -71,7 +55,7 @@ class Motor:
         momentum = _held(found.mass, hub_rate, self) + _held(transport, hub, self)
         force = self.loads(time, depth)[:, self.own] + _held(rate, hub_rate, self) + _held(state, hub, self)
         own = np.ix_(range(time.size), self.own, self.own)
-        return Stages(found.mass[own], transport[own], rate[own], state[own], momentum, force)
+        return Coefficients(found.mass[own], transport[own], rate[own], state[own], momentum, force)
 
     def start(self, depth, speed):
         """q and p at t = 0; the rate is that of statics in a straight rest line, as the theory page has it."""

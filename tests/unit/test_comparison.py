@@ -9,9 +9,9 @@ from fem_needle import ComputationError, FiniteElementNeedle, SceneError, load_s
 from fem_needle.cli.compare_table import EARLY, _depths, _in_the_run, _numbers
 from fem_needle.comparison import runs
 from fem_needle.comparison.at_rest import compared_depths, relative_difference
-from fem_needle.comparison.equals import COUNTS
 from fem_needle.comparison.ranges import Interval, described, intervals_within
 from fem_needle.comparison.study import compare
+from fem_needle.finite_element_model import ELEMENT_CHOICES
 from fem_needle.models import build_plant
 
 SHORT = {"insertion.final_depth": 0.06, "numerics.output_step": 1.0}
@@ -273,7 +273,7 @@ def test_the_cheapest_elements_as_right_stand_beside_a_model():
     assert 1 < found.equal.elements < 8
     assert found.equal.tip_error <= found.largest_tip_error
     assert found.equal.factor == pytest.approx(found.equal.model_time / found.equal.solve_time)
-    fewer = [count for count in COUNTS if count < found.equal.elements]
+    fewer = [count for count in ELEMENT_CHOICES if count < found.equal.elements]
     assert all(_error_of(count) > found.largest_tip_error for count in fewer)
 
 
