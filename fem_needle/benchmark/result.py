@@ -92,7 +92,7 @@ class ScalingRow:
     Attributes
     ----------
     over
-        "elements", "duration", "pieces of a cut path", "points of a table" or "runs".
+        "elements", "duration", "layers", "pieces of a cut path", "points of a table" or "runs".
     method
         Name.
     size

@@ -33,13 +33,13 @@ def scaling_picture(rows: tuple[ScalingRow, ...]) -> bytes:
 
 
 def _draw_others(axes: Axes, rows: tuple[ScalingRow, ...]) -> None:
-    """Draw a step over pieces, points and runs."""
+    """Draw a step over layers, pieces, points and runs."""
     names = [over for over in dict.fromkeys(row.over for row in rows) if over not in {"elements", "duration"}]
     for index, over in enumerate(names):
         chosen = [row for row in rows if row.over == over and row.per_step is not None]
         style: dict[str, Any] = {"color": COLORS[index + 2], "marker": MARKERS[index + 2], "label": over}
         axes.plot([row.size for row in chosen], [UNITS["per_step"] * (row.per_step or 0.0) for row in chosen], **style)
-    axes.set(xlabel="pieces, points, runs", ylabel=LABELS["per_step"], xscale="log", ylim=(0.0, None))
+    axes.set(xlabel="layers, pieces, points, runs", ylabel=LABELS["per_step"], xscale="log", ylim=(0.0, None))
     if names:
         axes.legend(frameon=False)
 

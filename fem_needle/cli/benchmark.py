@@ -33,7 +33,7 @@ def register(application: typer.Typer) -> None:
 def benchmark(
     cases: Names = None,
     goals: Annotated[bool, typer.Option("--goals", help="Measure every goal: goal, measured, met.")] = False,
-    scaling: Annotated[bool, typer.Option("--scaling", help="Cost over elements, duration, path, tables, runs; memory.")] = False,
+    scaling: Annotated[bool, typer.Option("--scaling", help="Cost over elements, duration, layers, path, tables, runs.")] = False,
     repeats: Annotated[int, typer.Option(metavar="N", help="Rounds in which the methods take turns.")] = 5,
     quick: Annotated[bool, typer.Option("--quick", help="One round of the two coarsest settings of each method.")] = False,
     rivals: Scripts = None,

@@ -252,10 +252,10 @@ def test_wrong_input_is_told(command_line, arguments, message):
 def test_the_scaling_has_times_and_memory(monkeypatch):
     monkeypatch.setattr("fem_needle.benchmark.scaling.STEPS", 10)
     monkeypatch.setattr("fem_needle.benchmark.scaling.NAIVE_STEPS", 10)
-    rows = scaling(Sizes((10,), (0.02,), (20,), (30,), (2,)))
+    rows = scaling(Sizes((10,), (0.02,), (3,), (20,), (30,), (2,)))
     assert [(one.over, one.size) for one in rows] == [
-        ("elements", 10), ("elements", 10), ("duration", 0.02), ("pieces of a cut path", 20), ("points of a table", 30),
-        ("runs", 2),
+        ("elements", 10), ("elements", 10), ("duration", 0.02), ("layers", 3), ("pieces of a cut path", 20),
+        ("points of a table", 30), ("runs", 2),
     ]  # fmt: skip
     assert all(one.per_step and one.memory for one in rows)
 
