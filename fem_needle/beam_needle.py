@@ -21,7 +21,7 @@ from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Plant, Points, RestTerms
 from fem_needle.row_blocks import row_blocks
 from fem_needle.scene import Guide, LateralLoad, Scene, as_function
-from fem_needle.shapes import Shapes
+from fem_needle.shapes import Shapes, values_at
 
 Array = NDArray[np.float64]
 
@@ -178,9 +178,8 @@ class BeamNeedle(PolynomialNeedle, ABC):
             inserted = depths[block, None]
             row, station = np.nonzero((stations > length - inserted) & (inserted > 0))
             places, stretch = self.frame.places(stations[station], length, depths[block][row])
-            first, values = self.shapes.rows(places, derivative)
-            acting = coordinates[block][row[:, None], first[:, None] + np.arange(values.shape[1])]
-            result[block][row, station] = np.einsum("kj,kj->k", values, acting) / stretch**derivative
+            values = values_at(self.shapes, coordinates[block], row, places, derivative)
+            result[block][row, station] = values / stretch**derivative
         return result
 
     @abstractmethod
@@ -194,8 +193,7 @@ class BeamNeedle(PolynomialNeedle, ABC):
 
 def points_of(scene: Scene) -> tuple[Guide | LateralLoad, ...]:
     """Return guides and lateral loads, the points in front of the tip."""
-    lateral = tuple(load for load in scene.loads if isinstance(load, LateralLoad))
-    return (*scene.support.guides, *lateral)
+    return (*scene.support.guides, *scene.lateral_loads)
 
 
 def _compliances(guides: tuple[Guide, ...]) -> Array:

@@ -1,4 +1,4 @@
-"""A run as CSV: a column for each variable over time, and the deflection at every station.
+"""A run as CSV: a column for each variable over time, and what it has along the needle at every station.
 
 Headers are those that a scene reads as well: ``tip_deflection [m]``. Numbers keep all their digits.
 """
@@ -22,15 +22,15 @@ def series_csv(run: Trajectory) -> bytes:
     for name, (dimensions, unit, _, values) in described_values(run).items():
         if dimensions == ("time",):
             columns[f"{name} [{unit}]"] = values
-        elif dimensions in {("time", "guide"), ("time", STATION)}:
+        elif dimensions in {("time", "guide"), ("time", "load"), ("time", STATION)}:
             columns |= {f"{name}_{number} [{unit}]": column for number, column in enumerate(values.T, start=1)}
     return _csv(columns, np.column_stack(list(columns.values())))
 
 
-def deflection_csv(run: Trajectory) -> bytes:
-    """Return `deflection.csv`: a row for each time and a column for each station, whose header is its arc length [m]."""
-    header = ["time [s]", *(f"{station!r} [m]" for station in run.arc_length.tolist())]
-    return _csv(header, np.column_stack((run.time, run.station_deflection)))
+def station_csv(name: str, run: Trajectory) -> bytes:
+    """Return a variable of `series.nc`: a row for each time and a column for each station, whose header is its arc length [m]."""
+    header = ["time [s]", *(f"{station:.12g} [m]" for station in run.arc_length.tolist())]
+    return _csv(header, np.column_stack((run.time, described_values(run)[name][3])))
 
 
 def _csv(header: Iterable[str], table: Array) -> bytes:

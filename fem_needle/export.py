@@ -4,27 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from fem_needle.atomic_file import write_atomically
-from fem_needle.csv_file import deflection_csv, series_csv
+from fem_needle.csv_file import series_csv, station_csv
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.folder_lock import FolderLock
 from fem_needle.matlab_file import matlab_file
 from fem_needle.run_target import FRAMES
+from fem_needle.series_file import along_needle
 from fem_needle.trajectory import Trajectory
 from fem_needle.vtk_export import COLLECTION, VtkSeries, frames_of_run
 from fem_needle.vtkhdf_file import vtkhdf_file
 
 FORMATS = ("pvd", "vtkhdf", "csv", "mat")
-SPLINE = (
-    "bending_moment and shear_force come from a spline through the stations: the moment is good to some percents, "
-    "the shear force is rough, most of all beside guides and lateral forces; the frames of the run itself are exact"
-)
-REBUILT = {"pvd": SPLINE, "vtkhdf": SPLINE}  # formats with values that a run folder does not hold
 
 _FILES: dict[str, dict[str, Callable[[Trajectory], bytes]]] = {
-    "csv": {"series.csv": series_csv, "deflection.csv": deflection_csv},
+    "csv": {"series.csv": series_csv},
     "mat": {"series.mat": matlab_file},
     "vtkhdf": {"deflection.vtkhdf": vtkhdf_file},
 }
@@ -55,7 +52,7 @@ def export_run(run: Trajectory, kind: str, path: Path, *, force: bool = False) -
         raise SceneError(f"format: is not a choice (got {kind!r}; allowed {', '.join(FORMATS)})")
     if kind == "pvd":
         return _export_frames(run, path, force=force)
-    targets = _targets(kind, path)
+    targets = _targets(run, kind, path)
     for target in targets:
         check_target(target, force=force)
     for target, content in targets.items():
@@ -65,10 +62,11 @@ def export_run(run: Trajectory, kind: str, path: Path, *, force: bool = False) -
     return tuple(targets)
 
 
-def _targets(kind: str, path: Path) -> dict[Path, Callable[[Trajectory], bytes]]:
+def _targets(run: Trajectory, kind: str, path: Path) -> dict[Path, Callable[[Trajectory], bytes]]:
     if path.suffix == f".{kind}" and kind in {"mat", "vtkhdf"}:
         return dict.fromkeys((path,), *_FILES[kind].values())
-    return {path / name: content for name, content in _FILES[kind].items()}
+    along = {f"{name}.csv": partial(station_csv, name) for name in along_needle(run)} if kind == "csv" else {}
+    return {path / name: content for name, content in (_FILES[kind] | along).items()}
 
 
 def check_target(target: Path, *, force: bool) -> None:

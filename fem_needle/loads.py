@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_needle.scene import LateralLoad, Scene, Sinusoid, TimeFunction, TipLoad, as_function
+from fem_needle.scene import Scene, Sinusoid, TimeFunction, TipLoad, as_function
 from fem_needle.segments import tip_values
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ def load_case(scene: Scene, depth: float, time: float) -> LoadCase:
 
 def load_cases(scene: Scene, depths: Array, times: Array) -> LoadCase:
     """Return the loads at many depths [m] and times [s] (T,): every array has a row for each."""
-    known = [as_function(load.force) for load in scene.loads if isinstance(load, LateralLoad)]
+    known = [as_function(load.force) for load in scene.lateral_loads]
     if turns_with_needle(scene):
         known.append(as_function(scene.support.hub_torque))
     tip, tip_rate = _tip_forces(scene, depths, times)

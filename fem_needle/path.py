@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+import scipy  # its parts are loaded where they are used
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -45,6 +46,15 @@ class CutPath:
         cut = ((powers[..., 3] * offset + powers[..., 2]) * offset + powers[..., 1]) * offset + powers[..., 0]
         return np.where(y >= self.deepest, self.front, np.where(y >= self.edges[0], cut, 0.0))
 
+    def integrals(self, y: Array) -> tuple[Array, Array]:
+        """Return the integrals of r and of r y from the surface to positions y [m] on the path or before it."""
+        if not len(self.coefficients):
+            return np.zeros(y.shape), np.zeros(y.shape)
+        places = np.clip(y, self.edges[0], self.deepest)
+        once = scipy.interpolate.PPoly(self.coefficients.T[::-1], self.edges).antiderivative()
+        total = once(places)
+        return total, places * total - once.antiderivative()(places)
+
     def extended(self, positions: Sequence[float], deflections: Sequence[float]) -> CutPath:
         """Return the path with one more piece: the polynomial through the given points, up to the last of them.
 
@@ -72,9 +82,30 @@ class CutPath:
         y = np.concatenate([self.edges[:1], self.edges])
         return y, np.concatenate([[0.0, self.coefficients[0, 0]], ends])
 
+    def up_to(self, depth: float) -> CutPath:
+        """Return the path as it was when the tip stood at a depth [m] on its way."""
+        if depth >= self.deepest:
+            return self
+        count = int(np.searchsorted(self.edges, depth))
+        if count == 0:
+            return straight_path(depth)
+        edges = np.append(self.edges[:count], depth)
+        return CutPath(edges, self.coefficients[:count], float(self.value(np.array(depth))))
+
     def seen_from(self, depth: float, tip_deflection: float) -> CutPath:
         """Return the path with the front of a tip that stands at a depth inside the last piece or beyond."""
         return replace(self, front=tip_deflection) if depth >= self.deepest else self
+
+
+def path_through(positions: Array, deflections: Array, coefficients: Array) -> CutPath:
+    """Return the path of points as `CutPath.points` gives them; straight pieces between them where their powers are unknown."""
+    if not len(positions):
+        return CutPath(np.array([np.inf]), np.zeros((0, 4)))
+    edges, values = positions[1:], deflections[1:]
+    if len(coefficients) != len(edges) - 1:
+        coefficients = np.zeros((len(edges) - 1, 4))
+        coefficients[:, 0], coefficients[:, 1] = values[:-1], np.diff(values) / np.diff(edges)
+    return CutPath(edges, coefficients, float(values[-1]))
 
 
 def straight_path(depth: float) -> CutPath:

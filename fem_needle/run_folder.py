@@ -25,8 +25,9 @@ from fem_needle.sample_arrays import Samples, joined
 from fem_needle.scene import Scene
 from fem_needle.scene.steering import SIGNAL_PREFIXES
 from fem_needle.scene_file import load_scene, scene_text
-from fem_needle.series_file import read_series, series_bytes
-from fem_needle.trajectory import VARIABLES, Trajectory, summary_of, trajectory_from_samples
+from fem_needle.section_forces import SectionForces
+from fem_needle.series_file import SECTION, read_series, series_bytes
+from fem_needle.trajectory import LATER_VARIABLES, VARIABLES, Trajectory, summary_of, trajectory_from_samples
 from fem_needle.vtk_export import VtkSeries, frames_of_run, frames_of_samples
 
 Array = NDArray[np.float64]
@@ -171,7 +172,8 @@ class RunFolderWriter:
             write_atomically(folder / MANIFEST, json_bytes(self._manifest))
             write_atomically(folder / SCENE, scene_text(scene).encode("utf-8"))
             self._reserve = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 (held for the whole run)
-            self._reserve.write(bytes(min(MOST_RESERVED, 8 * rows * (len(VARIABLES) + arc_length.size) + OVERHEAD)))
+            numbers = rows * (len(VARIABLES) + (1 + len(SECTION)) * arc_length.size)
+            self._reserve.write(bytes(min(MOST_RESERVED, 8 * numbers + OVERHEAD)))
             self._reserve.flush()
             if self._vtk:
                 self._frames = VtkSeries(folder, scene, arc_length)
@@ -270,6 +272,8 @@ def load_run(folder: Path) -> Trajectory:
         summary = json.loads((folder / SUMMARY).read_bytes())
     except (OSError, ValueError, RecursionError) as error:
         raise SceneError(f"{folder}: the run is not complete: {_progress(folder) or _lost(folder) or error}") from None
+    rows = values["time"].size if "time" in values else 0
+    values = {name: np.full(rows, np.nan) for name in LATER_VARIABLES} | {"lateral_force": np.zeros((rows, 0))} | values
     missing = {"time", "arc_length", "deflection", "guide_force", *VARIABLES} - set(values)
     if missing or not isinstance(summary, dict):
         raise SceneError(f"{folder}: the run is not complete: no {', '.join(sorted(missing)) or 'summary'}")
@@ -279,11 +283,13 @@ def load_run(folder: Path) -> Trajectory:
         time=values["time"],
         series={name: values[name] for name in VARIABLES},
         guide_force=values["guide_force"],
+        lateral_force=values["lateral_force"],
         path_position=values.get("path_position", np.zeros(0)),
         path_deflection=values.get("path_deflection", np.zeros(0)),
         signals={name: values[name] for name in values if name.startswith(SIGNAL_PREFIXES)},
         arc_length=values["arc_length"],
         station_deflection=values["deflection"],
+        stored_sections=SectionForces(values["bending_moment"], values["shear_force"]) if "shear_force" in values else None,
         summary=summary | {"folder": str(folder.resolve())},
     )
 
@@ -306,7 +312,8 @@ def _check_shapes(folder: Path, values: dict[str, Array]) -> None:
     """Refuse series whose variables do not belong together."""
     rows, stations = values["time"].size, values["arc_length"].size
     expected: dict[str, tuple[int, ...]] = dict.fromkeys(("time", *VARIABLES), (rows,))
-    expected |= {"arc_length": (stations,), "deflection": (rows, stations)}
+    along = {name for name in ("deflection", *SECTION) if name in values}
+    expected |= {"arc_length": (stations,)} | dict.fromkeys(along, (rows, stations))
     expected |= {"guide_force": (rows, values["guide_force"].shape[-1] if values["guide_force"].ndim else 0)}
     wrong = [name for name, shape in expected.items() if values[name].shape != shape]
     if wrong or rows == 0 or stations < 2:

@@ -13,7 +13,8 @@ from fem_needle.manifest import FILE as MANIFEST
 from fem_needle.manifest import is_run_folder
 
 # What a run folder holds, exports of an older run included; `force` removes this and nothing else.
-EXPORTS = ("series.csv", "deflection.csv", "series.mat", "deflection.vtkhdf")
+_TABLES = ("series", "deflection", "bending_moment", "shear_force", "curvature", "bending_stress")
+EXPORTS = (*(f"{name}.csv" for name in _TABLES), "series.mat", "deflection.vtkhdf")
 # Pictures of a run by kind, each with one of the endings.
 PICTURES = {"shapes": "shapes", "tip-path": "tip_path", "courses": "courses", "energies": "energies", "waterfall": "waterfall"}
 ANIMATION = "animation.gif"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fem_needle import axial, banded
 from fem_needle.ledger import StepEnd, StepParts, Works, axial_momentum, configuration_force, energies
 from fem_needle.plant import Plant
-from fem_needle.sample_arrays import OVER_TIME, Samples
+from fem_needle.sample_arrays import OVER_TIME, PATH, Samples
 from fem_needle.stages import internal_force
 
 Array = NDArray[np.float64]
@@ -33,10 +33,14 @@ class Sample:
     depth: float
     speed: float
     coordinates: Array
+    velocities: Array
+    accelerations: Array
     point_forces: Array
     guide_force: Array
     push_force: float
     friction_force: float
+    cutting_force: float
+    axial_force: float
     tissue_force: float
     hub_force: float
     hub_moment: float
@@ -56,13 +60,14 @@ class Sample:
     axial_kinetic_energy: float
     path_position: Array
     path_deflection: Array
+    path_cubics: Array
 
 
 def stacked(samples: Sequence[Sample]) -> Samples:
     """Return samples, at least one, in order of time, as rows of arrays."""
     over_time = {name: np.array([getattr(sample, name) for sample in samples]) for name in OVER_TIME if name != "path_points"}
     points, last = np.array([len(sample.path_position) for sample in samples]), samples[-1]
-    return Samples(**over_time, path_position=last.path_position, path_deflection=last.path_deflection, path_points=points)
+    return Samples(**over_time, **{name: getattr(last, name) for name in PATH}, path_points=points)
 
 
 def sample_step(
@@ -76,7 +81,7 @@ def sample_step(
     instant, solution, scene = end.stage.instant, end.solution, plant.scene
     mass = scene.needle.mass_per_length * scene.needle.length
     friction = axial.friction_force(scene, depth, instant.speed)
-    resisting = friction + axial.cutting_force(scene, depth, instant.speed, deepest)
+    cutting = axial.cutting_force(scene, depth, instant.speed, deepest)
     axial_force = axial_force_at(plant, step, at_start=at_start, inertia=inertia)
     needed, tissue = _reactions(plant, step, end, at_start=at_start, inertia=inertia)
     hub_force, hub_moment = reactions_of_clamp(plant, needed, depth, solution.forces)
@@ -86,16 +91,21 @@ def sample_step(
         depth=depth,
         speed=instant.speed,
         coordinates=solution.coordinates,
+        velocities=solution.velocities if inertia else _rate_of_coordinates(step, at_start=at_start),
+        accelerations=_accelerations(step, at_start=at_start, inertia=inertia),
         point_forces=solution.forces,
         guide_force=_guide_forces(step, end, inertia=inertia),
-        push_force=mass * instant.acceleration + resisting - axial_force,
+        push_force=mass * instant.acceleration + friction + cutting - axial_force,
         friction_force=friction,
+        cutting_force=cutting,
+        axial_force=axial_force,
         tissue_force=tissue,
         hub_force=hub_force,
         hub_moment=hub_moment,
         axial_kinetic_energy=0.5 * mass * instant.speed**2,
         path_position=path_position,
         path_deflection=path_deflection,
+        path_cubics=np.zeros((0, 4)) if end.path is None else end.path.coefficients,
         **_ledger_values(end, works, inertia=inertia),
     )
 
@@ -143,10 +153,10 @@ def reactions_of_clamp(plant: Plant, residual: Array, depth: float, point_forces
 
 
 def _guide_forces(step: StepParts, end: StepEnd, *, inertia: bool) -> Array:
-    """Return the guides' forces; with inertia a rigid one's mean over the step, about which an index-3 multiplier alternates."""
+    """Return the guides' forces; where no node is the end a rigid one's mean, about which its multiplier alternates."""
     points = end.stage.points
     forces = end.solution.forces[: points.guides]
-    if not inertia:
+    if not inertia or step.method.nodes[-1] == 1.0:
         return forces
     weighted = [w * s.forces[: points.guides] for w, s in zip(step.method.weights, step.solutions, strict=True)]
     return np.where(points.guide_compliance > 0.0, forces, np.sum(weighted, axis=0)) if points.guides else forces
@@ -155,6 +165,13 @@ def _guide_forces(step: StepParts, end: StepEnd, *, inertia: bool) -> Array:
 def _axial_momenta(step: StepParts) -> list[float]:
     pairs = [(step.ends[0].stage, step.ends[0].solution), *zip(step.stages, step.solutions, strict=True)]
     return [axial_momentum(stage, solution.coordinates, solution.velocities) for stage, solution in pairs]
+
+
+def _accelerations(step: StepParts, *, at_start: bool, inertia: bool) -> Array:
+    states = [step.ends[0].solution, *step.solutions]
+    if not inertia:
+        return np.zeros_like(states[0].coordinates)
+    return np.asarray(_rate(step, [state.velocities for state in states], at_start=at_start))
 
 
 def _rate_of_coordinates(step: StepParts, *, at_start: bool) -> Array:

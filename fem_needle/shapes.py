@@ -74,3 +74,10 @@ class Shapes(Protocol):
 
     def polynomials(self) -> PiecewisePolynomials:
         """Return the shapes as polynomials on pieces, always the same object."""
+
+
+def values_at(shapes: Shapes, coordinates: Array, rows: Integers, places: Array, derivative: int = 0) -> Array:
+    """Return values (k,) of functions with coordinates (T, size), or of a derivative, each of a row and at a place of its own."""
+    first, values = shapes.rows(places, derivative)
+    acting = coordinates[rows[:, None], first[:, None] + np.arange(values.shape[1])]
+    return np.asarray(np.einsum("kj,kj->k", values, acting), dtype=float)

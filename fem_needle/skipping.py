@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from fem_needle.scene import LateralLoad, Scene
+from fem_needle.scene import Scene
 from fem_needle.segments import one_layer_holds
 
 INERTIA_SHARE = 0.25  # of the tolerance: what leaving out inertia may cost
@@ -39,8 +39,7 @@ def swelling(scene: Scene) -> str:
 
 def points_in_front(scene: Scene) -> str:
     """Guides and lateral loads: no rows, no kinks, no guide forces to solve for."""
-    has_points = scene.support.guides or any(isinstance(load, LateralLoad) for load in scene.loads)
-    return "" if has_points else "no guide and no lateral load"
+    return "" if scene.support.guides or scene.lateral_loads else "no guide and no lateral load"
 
 
 def cut_elements(scene: Scene) -> str:

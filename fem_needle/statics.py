@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,9 @@ from fem_needle.display import MILLIMETERS, Card, Shown
 from fem_needle.errors import ComputationError
 from fem_needle.limits import stations_on
 from fem_needle.loads import LoadCase, load_case
-from fem_needle.plant import Operators, Plant, Points
+from fem_needle.path import CutPath
+from fem_needle.plant import Operators, Plant, Points, RestTerms
+from fem_needle.scene import as_function
 
 Array = NDArray[np.float64]
 
@@ -75,7 +77,7 @@ class Equilibrium(Shown):
         return self.plant.deflection(self.coordinates, self.point_forces, self.depth, stations, derivative)
 
 
-def solve_static(plant: Plant, *, depth: float, time: float = 0.0) -> Equilibrium:
+def solve_static(plant: Plant, *, depth: float, time: float = 0.0, path: CutPath | None = None) -> Equilibrium:
     """Return the equilibrium at a depth under the loads of a time.
 
     Parameters
@@ -86,6 +88,8 @@ def solve_static(plant: Plant, *, depth: float, time: float = 0.0) -> Equilibriu
         Inserted length z [m], 0 to the needle's length.
     time
         Instant [s] at which loads, hub motion and stiffness factor are taken.
+    path
+        What the tissue rests on, as `fem_needle.linear.slow_cut.slow_cut` gives it; a straight line without one.
 
     Raises
     ------
@@ -95,33 +99,75 @@ def solve_static(plant: Plant, *, depth: float, time: float = 0.0) -> Equilibriu
     case = load_case(plant.scene, depth, time)
     if depth < plant.smallest_depth:
         return _straight(plant, depth, time, case)
-    return equilibrium_of(plant, plant.operators(depth, time), plant.points(depth), case, depth=depth, time=time)
+    there = plant.operators(depth, time), plant.points(depth)
+    return equilibrium_of(plant, *there, case, depth=depth, time=time, rest=rest_of(plant, path, depth, time))
+
+
+def rest_of(plant: Plant, path: CutPath | None, depth: float, time: float) -> RestTerms | None:
+    """Return what a path adds to the tissue's energy at a depth, the stiffness factor of a time included."""
+    if path is None:
+        return None
+    terms = plant.rest_terms(path, depth, -np.inf, np.inf)
+    factor = float(as_function(plant.scene.tissue.stiffness_factor).value(time))
+    return RestTerms(*(factor * getattr(terms, part.name) for part in fields(RestTerms)))
 
 
 def equilibrium_of(
-    plant: Plant, operators: Operators, points: Points, case: LoadCase, *, depth: float, time: float
+    plant: Plant,
+    operators: Operators,
+    points: Points,
+    case: LoadCase,
+    *,
+    depth: float,
+    time: float,
+    rest: RestTerms | None = None,
 ) -> Equilibrium:
     """Return the equilibrium of matrices that are there already; errors as in `solve_static`."""
-    state = _supported_state(plant, operators, points, case, depth=depth, time=time)
+    pulled = None if rest is None else rest.load
+    state = _supported_state(plant, operators, points, case, depth=depth, time=time, rest_load=pulled)
     rounding = 0.0
     if operators.beam is None:
         rounding = ROUNDING * float(np.max(np.abs(operators.stiffness)) * np.max(np.abs(state[0])))
-    return check_force_sum(_equilibrium(plant, depth, time, operators, *state), points, rounding)
+    return check_force_sum(_equilibrium(plant, depth, time, operators, *state, rest_load=pulled), points, rounding)
 
 
 def static_state(
-    plant: Plant, operators: Operators, points: Points, case: LoadCase, *, depth: float, time: float
+    plant: Plant,
+    operators: Operators,
+    points: Points,
+    case: LoadCase,
+    *,
+    depth: float,
+    time: float,
+    rest_load: Array | None = None,
 ) -> tuple[Array, Array]:
-    """Return coordinates and point forces of the equilibrium under a load case; depth and time are for messages."""
-    return _supported_state(plant, operators, points, case, depth=depth, time=time)[:2]
+    """Return coordinates and point forces of the equilibrium under a load case; depth and time are for messages.
+
+    ``rest_load``: of a path on which the tissue rests, m H.
+    """
+    return _supported_state(plant, operators, points, case, depth=depth, time=time, rest_load=rest_load)[:2]
+
+
+def no_load_case(case: LoadCase) -> LoadCase:
+    """Return a case of the same size without loads, the clamp straight."""
+    return LoadCase(*(np.zeros_like(getattr(case, part.name)) for part in fields(LoadCase)))
 
 
 def _supported_state(
-    plant: Plant, operators: Operators, points: Points, case: LoadCase, *, depth: float, time: float
+    plant: Plant,
+    operators: Operators,
+    points: Points,
+    case: LoadCase,
+    *,
+    depth: float,
+    time: float,
+    rest_load: Array | None,
 ) -> tuple[Array, Array, Array]:
     """Return coordinates, point forces and what the clamped coordinates' equations lack."""
     guides, known = points.guides, known_coordinates(plant, case)
     resisted = banded.multiply(operators.tissue, known)  # a straight needle has no bending
+    if rest_load is not None:
+        resisted = resisted - rest_load
     force = points.rows[guides:].T @ case.forces - resisted
     gap = points.rows[:guides] @ known + points.flexibility[:guides, guides:] @ case.forces
     try:
@@ -168,12 +214,21 @@ def _solve_supported(
 
 
 def _equilibrium(
-    plant: Plant, depth: float, time: float, operators: Operators, coordinates: Array, forces: Array, support: Array
+    plant: Plant,
+    depth: float,
+    time: float,
+    operators: Operators,
+    coordinates: Array,
+    forces: Array,
+    support: Array,
+    *,
+    rest_load: Array | None,
 ) -> Equilibrium:
     """Collect a static state and the reactions that follow from it."""
     hub_force, hub_moment = plant.clamp_reactions(support, depth)
     guides = len(plant.scene.support.guides)
-    tissue = -plant.deflection_at_one @ banded.multiply(operators.tissue, coordinates)
+    resisted = banded.multiply(operators.tissue, coordinates)
+    tissue = -plant.deflection_at_one @ (resisted if rest_load is None else resisted - rest_load)
     return Equilibrium(
         plant,
         depth,
@@ -209,19 +264,24 @@ def check_force_sum(rest: Equilibrium, points: Points, rounding: float = 0.0) ->
     return rest
 
 
-def depth_derivative(plant: Plant, rest: Equilibrium) -> tuple[Array, Array]:
+def depth_derivative(plant: Plant, rest: Equilibrium, path: CutPath | None = None) -> tuple[Array, Array]:
     """Return dq/dz and the guides' dR/dz of the static solution at frozen loads.
 
-    K dq/dz = N.dR/dz + dN/dz.P - d(K + m G)/dz q, the guides still holding.
+    K dq/dz = N.dR/dz + dN/dz.P - d(K + m G)/dz q + m dH/dz, the guides still holding; H of the path, which the tip cuts on.
     """
     if rest.depth < plant.smallest_depth:
         return np.zeros(plant.size), np.zeros(0)
-    return derivative_of(plant, rest, plant.operators(rest.depth, rest.time), plant.points(rest.depth))
+    there = plant.operators(rest.depth, rest.time), plant.points(rest.depth)
+    return derivative_of(plant, rest, *there, rest_of(plant, path, rest.depth, rest.time))
 
 
-def derivative_of(plant: Plant, rest: Equilibrium, operators: Operators, points: Points) -> tuple[Array, Array]:
+def derivative_of(
+    plant: Plant, rest: Equilibrium, operators: Operators, points: Points, terms: RestTerms | None = None
+) -> tuple[Array, Array]:
     """Return what `depth_derivative` does, of matrices that are there already."""
     moved = plant.stiffness_rate_product(rest.coordinates, rest.depth, rest.time)
+    if terms is not None:
+        moved = moved - terms.load_rate
     force = points.row_rates.T @ rest.point_forces - moved
     guides = points.guides
     drift = points.row_rates[:guides] @ rest.coordinates + points.flexibility_rate[:guides] @ rest.point_forces

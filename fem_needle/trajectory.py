@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ from fem_needle.display import Card, Shown, in_millimeters, in_newtons, without_
 from fem_needle.limits import stations_on
 from fem_needle.motion import wanted_radius
 from fem_needle.plant import Plant
-from fem_needle.sample_arrays import Samples
+from fem_needle.sample_arrays import PATH, Samples
 from fem_needle.scene import Scene, as_function
+from fem_needle.section_forces import SectionForces, section_forces
 from fem_needle.time_integrals import twice_integrated
 
 Array = NDArray[np.float64]
@@ -29,6 +31,9 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "hub_angle": ("rad", "angle of the hub"),
     "push_force": ("N", "axial force that the insertion needs, positive going in"),
     "friction_force": ("N", "axial friction of the shaft, against the motion; 0 at rest"),
+    "cutting_force": ("N", "axial force that cutting takes while the tip advances at its deepest"),
+    "axial_force": ("N", "axial force A of the bent needle's tissue and supports, positive going in"),
+    "tip_force": ("N", "lateral force of the loads at the tip"),
     "tissue_force": ("N", "total lateral force of the tissue on the needle"),
     "hub_force": ("N", "lateral force of the clamp on the needle"),
     "hub_moment": ("N m", "moment of the clamp on the needle"),
@@ -50,6 +55,7 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "axial_kinetic_energy": ("J", "kinetic energy of the insertion"),
 }
 
+LATER_VARIABLES = ("cutting_force", "axial_force", "tip_force")  # that older files do not have
 SAME_STATION = 1e-6  # of the length
 ENERGY_BOUND = 0.01  # of the largest energy: a ledger that misses more says that the answer is not to be trusted
 _RATIOS = ("error_estimate", "relative_energy_residual")
@@ -81,15 +87,21 @@ class Trajectory(Shown):
         Stations from the hub, 0, to the tip, l [m], shape (n,).
     station_deflection
         Deflection at the stations [m], shape (nt, n).
+    lateral_force
+        Each lateral load [N], as commanded in a loop, shape (nt, loads).
     path_position, path_deflection
         Where the tip has cut: y [m] and rest line r [m] at the end of the run, shape (points,); empty without a cut path.
+    path_cubics
+        Powers of the pieces between these points (`fem_needle.sample_arrays.Samples`); empty where they are unknown.
     signals
         Commands and measurements of a loop, ``command_<input>`` and ``measurement_<reading>``, shape (nt,) or, of several
         stations, (nt, n); nan where there was none yet; empty without a loop.
     summary
         What ``summary.json`` holds.
-    plant, coordinates, point_forces
+    plant, samples
         The model and its state at each sample; None in a run that was loaded.
+    stored_sections
+        Bending moment and shear force of a run that was loaded.
     course
         In which steps it was taken (`fem_needle.run_job.Course`); None of a loop or a run that was loaded.
     """
@@ -100,13 +112,15 @@ class Trajectory(Shown):
     guide_force: Array
     arc_length: Array
     station_deflection: Array
+    lateral_force: Array = field(default_factory=lambda: np.zeros((0, 0)))
     path_position: Array = field(default_factory=lambda: np.zeros(0))
     path_deflection: Array = field(default_factory=lambda: np.zeros(0))
+    path_cubics: Array = field(default_factory=lambda: np.zeros((0, 4)))
     signals: dict[str, Array] = field(default_factory=dict)
     summary: dict[str, Any] = field(default_factory=dict)
     plant: Plant | None = None
-    coordinates: Array | None = None
-    point_forces: Array | None = None
+    samples: Samples | None = None
+    stored_sections: SectionForces | None = None
     course: Any = None
 
     def __getattr__(self, name: str) -> Array:
@@ -145,9 +159,55 @@ class Trajectory(Shown):
         if arc_length is None and derivative == 0:
             return self.station_deflection
         stations = self.arc_length if arc_length is None else stations_on(arc_length, self.scene.needle.length)
-        if self.plant is None or self.coordinates is None or self.point_forces is None:
+        if self.plant is None or self.samples is None:
             return np.stack([self._from_stations(row, stations, derivative) for row in range(len(self.time))])
-        return self.plant.deflection(self.coordinates, self.point_forces, self.depth, stations, derivative)
+        return self.plant.deflection(self.samples.coordinates, self.samples.point_forces, self.depth, stations, derivative)
+
+    @property
+    def coordinates(self) -> Array | None:
+        """Coordinates of the model at each sample, shape (nt, n); None in a run that was loaded."""
+        return None if self.samples is None else self.samples.coordinates
+
+    @property
+    def point_forces(self) -> Array | None:
+        """Forces on guides, at lateral loads and at the tip [N], shape (nt, p); None in a run that was loaded."""
+        return None if self.samples is None else self.samples.point_forces
+
+    @cached_property
+    def section_forces(self) -> SectionForces:
+        """Bending moment [N m] and shear force [N] at the stations of the run, shape (nt, n) each.
+
+        Of a run that was loaded and whose file has none, from a spline through its stations: the shear force is rough.
+        """
+        if self.stored_sections is not None:
+            return self.stored_sections
+        if self.plant is not None and self.samples is not None:
+            return section_forces(self.plant, self.samples, self.arc_length)
+        stiffness = self.scene.needle.bending_stiffness
+        return SectionForces(*(stiffness * self.deflection(derivative=derivative) for derivative in (2, 3)))
+
+    @property
+    def bending_moment(self) -> Array:
+        """EI w'' [N m] at the stations, shape (nt, n)."""
+        return self.section_forces.bending_moment
+
+    @property
+    def shear_force(self) -> Array:
+        """EI w''' [N] at the stations, shape (nt, n); a tip force F gives -F at the tip."""
+        return self.section_forces.shear_force
+
+    @property
+    def curvature(self) -> Array:
+        """The moment over the bending stiffness [1/m] at the stations, shape (nt, n)."""
+        return self.bending_moment / self.scene.needle.bending_stiffness
+
+    @property
+    def bending_stress(self) -> Array | None:
+        """Largest stress of a section [Pa], E r times the curvature, shape (nt, n); None where the scene gives no section."""
+        needle = self.scene.needle
+        if needle.outer_diameter is None or needle.youngs_modulus is None:
+            return None
+        return 0.5 * needle.youngs_modulus * needle.outer_diameter * self.curvature
 
     def _from_stations(self, row: int, stations: Array, derivative: int) -> Array:
         values, start = self.station_deflection[row], -np.inf
@@ -208,12 +268,11 @@ def trajectory_from_samples(
         guide_force=samples.guide_force,
         arc_length=stations,
         station_deflection=shapes,
-        path_position=samples.path_position,
-        path_deflection=samples.path_deflection,
+        lateral_force=samples.lateral_forces(len(scene.lateral_loads)),
+        **{name: getattr(samples, name) for name in PATH},
         summary=summary,
         plant=plant,
-        coordinates=samples.coordinates,
-        point_forces=samples.point_forces,
+        samples=samples,
     )
 
 

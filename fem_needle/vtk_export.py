@@ -6,16 +6,18 @@ Vector with `deflection` (needle) or `displacement_illustrative` (tissue) bends 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.atomic_file import write_atomically
+from fem_needle.path import CutPath, path_through
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
 from fem_needle.scene import Scene, as_function
+from fem_needle.section_forces import section_forces
 from fem_needle.tissue_block import TissueBlock, tissue_block
 from fem_needle.trajectory import Trajectory
 from fem_needle.vtk_file import collection_entry, collection_file, polyline_file
@@ -37,48 +39,42 @@ class Frame:
     ----------
     time, depth
         [s], [m].
-    deflection, curvature, third_derivative
-        w [m], w'' [1/m], w''' [1/m^2] at the stations, shape (n,).
-    path_position, path_deflection
-        The path cut so far, y and r [m]; empty without one.
+    deflection, bending_moment, shear_force
+        w [m], EI w'' [N m], EI w''' [N] at the stations, shape (n,).
+    path
+        The path cut so far.
     """
 
     time: float
     depth: float
     deflection: Array
-    curvature: Array
-    third_derivative: Array
-    path_position: Array = field(default_factory=lambda: np.zeros(0))
-    path_deflection: Array = field(default_factory=lambda: np.zeros(0))
+    bending_moment: Array
+    shear_force: Array
+    path: CutPath
 
     def rest_line(self, positions: Array) -> Array:
         """Return where the tissue's springs rest [m] at positions y [m]: on the path cut so far, else on the axis."""
-        if not len(self.path_position):
-            return np.zeros(positions.shape)
-        return np.interp(positions, self.path_position, self.path_deflection, left=0.0, right=0.0)
+        return np.where(positions <= self.path.deepest, self.path.value(positions), 0.0)
 
 
 def frames_of_samples(plant: Plant, samples: Samples, arc_length: Array) -> list[Frame]:
     """Return the frames of samples at stations from the hub, 0, to the tip, l [m]."""
-    state = (samples.coordinates, samples.point_forces, samples.depth)
-    shapes, curvatures, thirds = (plant.deflection(*state, arc_length, derivative) for derivative in (0, 2, 3))
+    shapes = plant.deflection(samples.coordinates, samples.point_forces, samples.depth, arc_length)
+    inside = section_forces(plant, samples, arc_length)
     return [
-        Frame(time, depth, shapes[row], curvatures[row], thirds[row], *samples.path_at(row))
+        Frame(time, depth, shapes[row], inside.bending_moment[row], inside.shear_force[row], samples.path_at(row))
         for row, (time, depth) in enumerate(zip(samples.time.tolist(), samples.depth.tolist(), strict=True))
     ]
 
 
 def frames_of_run(run: Trajectory, first: int = 0) -> list[Frame]:
     """Return the frames of a run from row ``first`` on."""
-    if first >= len(run.time):
-        return []
-    curvature, third = run.deflection(derivative=2), run.deflection(derivative=3)
     frames = []
     for row in range(first, len(run.time)):
-        cut = run.path_position <= np.max(run.depth[: row + 1])
-        path = (run.path_position[cut], run.path_deflection[cut])
-        shape = (run.station_deflection[row], curvature[row], third[row])
-        frames.append(Frame(float(run.time[row]), float(run.depth[row]), *shape, *path))
+        cut = int(np.count_nonzero(run.path_position <= np.max(run.depth[: row + 1])))
+        path = path_through(run.path_position[:cut], run.path_deflection[:cut], run.path_cubics[: max(cut - 2, 0)])
+        shape = (run.station_deflection[row], run.bending_moment[row], run.shear_force[row])
+        frames.append(Frame(float(run.time[row]), float(run.depth[row]), *shape, path))
     return frames
 
 
@@ -90,19 +86,19 @@ def needle_positions(scene: Scene, depth: float, arc_length: Array) -> Array:
 def needle_arrays(scene: Scene, frame: Frame, arc_length: Array) -> dict[str, NDArray[np.generic]]:
     """Return the arrays on the needle's points.
 
-    ``deflection`` (0, w, 0) [m]; ``bending_moment`` EI w'' [N m]; ``shear_force`` EI w''' [N], minus the force along y that the
-    part towards the tip exerts on the part towards the hub (a tip force F gives -F at the tip); ``tissue_reaction``
+    ``deflection`` (0, w, 0) [m]; ``bending_moment`` EI w'' [N m]; ``shear_force`` EI w''' [N], from equilibrium
+    (`fem_needle.section_forces`); ``tissue_reaction``
     -k m(t) (w - r) [N/m], the springs' force on the needle, without the viscous part; ``layer`` [1], -1 outside; ``radius`` [m].
     """
     positions = needle_positions(scene, frame.depth, arc_length)
     layer = layers_at(scene, positions)
     moduli = np.array([item.foundation_modulus for item in scene.tissue.layers] + [0.0])
     modulus = moduli[layer] * as_function(scene.tissue.stiffness_factor).value(frame.time)
-    stiffness, radius = scene.needle.bending_stiffness, scene.needle.radius
+    radius = scene.needle.radius
     return {
         "deflection": _along_y(frame.deflection),
-        "bending_moment": stiffness * frame.curvature,
-        "shear_force": stiffness * frame.third_derivative,
+        "bending_moment": frame.bending_moment,
+        "shear_force": frame.shear_force,
         "tissue_reaction": -modulus * (frame.deflection - frame.rest_line(positions)),
         "layer": layer,
         "radius": np.full(arc_length.shape, DRAWN_RADIUS * scene.needle.length if radius is None else radius),

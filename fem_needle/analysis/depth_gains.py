@@ -13,7 +13,9 @@ from fem_needle.errors import ComputationError, SceneError
 from fem_needle.linear.linearization import lateral_inputs, linearize, reach
 from fem_needle.linear.modal_form import lateral_frequencies
 from fem_needle.linear.model import Signal
+from fem_needle.linear.slow_cut import slow_cut
 from fem_needle.loads import LoadCase
+from fem_needle.path import CutPath
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene
 from fem_needle.statics import depth_derivative, solve_static, static_state
@@ -90,9 +92,11 @@ def depth_gains(plant: Plant, depths: ArrayLike | None = None, *, time: float = 
     if np.any(places <= least) or np.any(places > length) or np.any(np.diff(places) <= 0.0):
         raise SceneError(f"depths: out of range (got {places.tolist()}; allowed rising, above {least:g} to {length:g} m)")
     inputs = (*lateral_inputs(plant), Signal("depth", "m"))
-    gains = np.array([tip_gains(plant, float(depth), time) for depth in places])
-    frequencies = np.array([_frequencies(plant, float(depth), time) for depth in places])
-    changes = [change for index, one in enumerate(inputs) for change in _changes(plant, places, gains, index, one.name, time)]
+    path = slow_cut(plant, float(places[-1]), time)
+    gains = np.array([tip_gains(plant, float(depth), time, path) for depth in places])
+    frequencies = np.array([_frequencies(plant, float(depth), time, path) for depth in places])
+    names = [(index, one.name) for index, one in enumerate(inputs)]
+    changes = [change for one in names for change in _changes(plant, places, gains, one, time, path)]
     return DepthGains(places, inputs, gains, frequencies, tuple(changes))
 
 
@@ -103,21 +107,22 @@ def _default_depths(scene: Scene) -> Array:
     return np.linspace(least, max(reach(scene) - rest, 2 * least), POINTS)
 
 
-def _frequencies(plant: Plant, depth: float, time: float) -> Array:
+def _frequencies(plant: Plant, depth: float, time: float, path: CutPath | None) -> Array:
     """Return the lowest frequencies, nan where there are fewer or the model has none."""
     result = np.full(FREQUENCIES, np.nan)
     try:
-        found = lateral_frequencies(linearize(plant, depth=depth, time=time, axial="held"))[:FREQUENCIES]
+        found = lateral_frequencies(linearize(plant, depth=depth, time=time, axial="held", path=path))[:FREQUENCIES]
     except ComputationError:
         return result
     result[: len(found)] = found
     return result
 
 
-def tip_gains(plant: Plant, depth: float, time: float = 0.0) -> Array:
+def tip_gains(plant: Plant, depth: float, time: float = 0.0, path: CutPath | None = None) -> Array:
     """Return dw(tip) / d(input) of the equilibria at a depth [m], shape (inputs,), in the order of `DepthGains`.
 
     One static solution for each input of 1, which is exact, for statics are linear; by depth, N dq/dz + dN/dz q at the tip.
+    Tissue that rests on a cut path has it frozen for the inputs, cut on by depth: ``path``, default what a slow insertion cuts.
 
     Raises
     ------
@@ -135,19 +140,23 @@ def tip_gains(plant: Plant, depth: float, time: float = 0.0) -> Array:
         case = LoadCase(unit[:forces], none(unit[:forces]), clamp, none(clamp), none(clamp))
         state = static_state(plant, operators, points, case, depth=depth, time=time)
         gains.append(float(points.deflections(*state)[-1]))
-    rest = solve_static(plant, depth=depth, time=time)
-    moved, _ = depth_derivative(plant, rest)
+    here = slow_cut(plant, depth, time) if path is None else path.up_to(depth)
+    rest = solve_static(plant, depth=depth, time=time, path=here)
+    moved, _ = depth_derivative(plant, rest, here)
     return np.array([*gains, float(points.rows[-1] @ moved + points.row_rates[-1] @ rest.coordinates)])
 
 
-def _changes(plant: Plant, depths: Array, gains: Array, index: int, name: str, time: float) -> list[SignChange]:
+def _changes(
+    plant: Plant, depths: Array, gains: Array, one: tuple[int, str], time: float, path: CutPath | None
+) -> list[SignChange]:
+    index, name = one
     values = gains[:, index]
     floor = ZERO * float(np.max(np.abs(values), initial=0.0))
     kept = np.flatnonzero(np.abs(values) > floor)
     found = []
 
     def gain(depth: float) -> float:
-        return float(tip_gains(plant, depth, time)[index])
+        return float(tip_gains(plant, depth, time, path)[index])
 
     for left, right in pairwise(kept):
         if values[left] * values[right] < 0.0:

@@ -25,6 +25,7 @@ from fem_needle.errors import SceneError
 from fem_needle.linear.linearization import Axial, linearize, reach
 from fem_needle.linear.modal_form import AXIAL, modal
 from fem_needle.linear.model import LinearModel
+from fem_needle.linear.slow_cut import slow_cut
 from fem_needle.models import build_plant, model_family
 from fem_needle.motion import depth_law, run_duration
 from fem_needle.plant import Plant
@@ -211,7 +212,8 @@ def analyze(
     chosen = scene_depths(scene) if depths is None else [float(depth) for depth in depths]
     if not chosen or len(set(chosen)) < len(chosen):
         raise SceneError(f"depths: given twice or not at all (got {chosen}; allowed different depths)")
-    models = [linearize(plant, depth=depth, time=time, speed=speed, axial=axial) for depth in chosen]
+    path = slow_cut(plant, max(chosen), time)
+    models = [linearize(plant, depth=depth, time=time, speed=speed, axial=axial, path=path) for depth in chosen]
     points = tuple(_analyzed(plant, model) for model in models)
     warnings = (*plant.warnings, *_range_warnings(scene))
     return Analysis(plant, axial, points, depth_gains(plant, time=time), warnings)

@@ -29,12 +29,10 @@ def export(
 
     Example: fem-needle export runs/thesis --format csv
     """
-    from fem_needle.export import FORMATS, REBUILT, export_run
+    from fem_needle.export import FORMATS, export_run
     from fem_needle.run_folder import load_run
 
     if kind not in FORMATS:
         raise SceneError(f"--format: is not a choice (got {kind!r}; allowed {', '.join(FORMATS)})")
     for path in export_run(load_run(run), kind, run if out is None else out, force=force):
         typer.echo(f"wrote {path}")
-    if kind in REBUILT:
-        typer.echo(f"note: {REBUILT[kind]}", err=True)

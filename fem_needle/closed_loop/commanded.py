@@ -11,7 +11,7 @@ from fem_needle.closed_loop.motion import CommandedMotion
 from fem_needle.dynamics import names as at
 from fem_needle.dynamics.drive import Drive, drive_of, moving_rows
 from fem_needle.loads import turns_with_needle
-from fem_needle.scene import LateralLoad, Scene, TipLoad
+from fem_needle.scene import Scene, TipLoad
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def signals_of(scene: Scene, name: str) -> list[int]:
     """Return the numbers of the signals that an input of a scene is; a speed is none, its depth is."""
     if name in _OF_THE_HUB:
         return [_OF_THE_HUB[name]]
-    lateral = sum(isinstance(load, LateralLoad) for load in scene.loads)
+    lateral = len(scene.lateral_loads)
     tips = sum(isinstance(load, TipLoad) for load in scene.loads)
     torque = at.LOAD_SIGNAL + lateral
     first = torque + turns_with_needle(scene)

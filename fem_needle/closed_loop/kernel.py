@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fem_needle.collocation import Collocation
 from fem_needle.dynamics import names as at
-from fem_needle.dynamics.engine import REST, SAMPLE_COLUMNS, Engine
+from fem_needle.dynamics.engine import RECORD_PARTS, REST, SAMPLE_COLUMNS, Engine
 from fem_needle.dynamics.push import Push
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import Samples
@@ -21,13 +21,12 @@ class LoopEngine(Engine):
     Attributes
     ----------
     row
-        The record of the last output (RECORD + n + p + guides,), `fem_needle.dynamics.names`.
+        The record of the last output (`Model.record_ends`), `fem_needle.dynamics.names`.
     """
 
     def __init__(self, plant: Plant, kind: str, method: Collocation | None = None) -> None:
         super().__init__(plant, kind, method)
-        width = at.RECORD + self.model.size + self.model.points + int(self.model.switches[at.GUIDES])
-        self._rows, self._interval = np.zeros((1, width)), np.zeros((1, 4))
+        self._rows, self._interval = np.zeros((1, self.model.record_ends[-1])), np.zeros((1, 4))
         self.row: Array = self._rows[0]
         self._is_ready, self._counting = False, self.limits
         last = at.END, -1
@@ -80,15 +79,14 @@ class LoopEngine(Engine):
 
     def keep(self, samples: Samples) -> None:
         """Let the last of some samples be the `row`."""
-        n, p, row = self.model.size, self.model.points, self.row
+        row = self.row
         for name, column in SAMPLE_COLUMNS.items():
             row[column] = getattr(samples, name)[-1]
         row[at.R_PIECES] = max(0, int(samples.path_points[-1]) - 2)
-        row[at.RECORD : at.RECORD + n], row[at.RECORD + n : at.RECORD + n + p] = samples.coordinates[-1], samples.point_forces[-1]
-        row[at.RECORD + n + p :] = samples.guide_force[-1]
+        row[at.RECORD :] = np.concatenate([getattr(samples, name)[-1] for name in RECORD_PARTS])
 
     def samples(self, rows: Array) -> Samples:
-        """Return rows (T, RECORD + n + p + guides) as samples, with the path as it is now."""
+        """Return rows of a record as samples, with the path as it is now."""
         return super()._samples(rows)
 
     def _samples(self, record: Array) -> Samples:

@@ -169,7 +169,7 @@ class DrivenNeedle:
         return self._plant.deflection(self._live.lateral[0, 0], self._live.held, self.depth, arc_length)
 
     def samples(self, rows: Array) -> Samples:
-        """Return rows, as `row` gives them, as samples of a run (T, RECORD + n + p + guides)."""
+        """Return rows, as `row` gives them, as samples of a run."""
         return self._engine.samples(rows)
 
     def row(self) -> Array:

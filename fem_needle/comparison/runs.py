@@ -153,6 +153,6 @@ def _shape_norms(run: Trajectory, true: Trajectory, count: int) -> tuple[float, 
 
 def shape_at(run: Trajectory, row: int, stations: Array) -> Array:
     """Return the deflection [m] of one sample of a run that was not loaded, at arc lengths [m]."""
-    if run.plant is None or run.coordinates is None or run.point_forces is None:
+    if run.plant is None or run.samples is None:
         raise ComputationError("a run that was loaded from files has no model (compare runs as they are computed)")
-    return run.plant.deflection(run.coordinates[row], run.point_forces[row], float(run.depth[row]), stations)
+    return run.plant.deflection(run.samples.coordinates[row], run.samples.point_forces[row], float(run.depth[row]), stations)

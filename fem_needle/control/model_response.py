@@ -15,12 +15,14 @@ from scipy.optimize import brentq
 from fem_needle.analysis.depth_gains import END, SHALLOWEST
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.linear.linearization import lateral_inputs, reach
+from fem_needle.linear.slow_cut import slow_cut
 from fem_needle.loads import LoadCase, load_case
+from fem_needle.path import CutPath
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene, TipLoad
 from fem_needle.scene.cross_checks import input_obstacle
 from fem_needle.segments import interfaces
-from fem_needle.statics import static_state
+from fem_needle.statics import rest_of, static_state
 
 Array = NDArray[np.float64]
 
@@ -66,7 +68,9 @@ class DepthCurve:
 
 @dataclass(frozen=True)
 class ModelResponse:
-    """Static response of a model's tip to one input; loads, hub and stiffness factor of t = 0, springs on the straight line.
+    """Static response of a model's tip to one input; loads, hub and stiffness factor of t = 0.
+
+    Springs rest on the straight line, or on the path that a slow insertion cuts without the input.
 
     Attributes
     ----------
@@ -141,7 +145,8 @@ def model_response(plant: Plant, name: str, *, depths: tuple[float, float], shar
     passes both are smooth; at one their slopes jump, and themselves under the bevel law: each piece has its own spline.
     """
     index = _input_index(plant, name)
-    pieces = [_piece(plant, index, name, part) for part in pairwise(_breaks(plant.scene, depths))]
+    path = slow_cut(plant, depths[1])
+    pieces = [_piece(plant, index, name, part, path) for part in pairwise(_breaks(plant.scene, depths))]
     coarse = [_sampled(piece, np.linspace(piece.start, piece.end, COARSEST + 1)) for piece in pieces]
     largest = np.max([np.max(np.abs(values), axis=0) for values in coarse], axis=0)
     if largest[0] == 0.0:
@@ -178,7 +183,7 @@ def _breaks(scene: Scene, depths: tuple[float, float]) -> list[float]:
     return [first, *(level for level in interfaces(scene.tissue.layers) if first < level < last), last]
 
 
-def _piece(plant: Plant, index: int, name: str, ends: tuple[float, float]) -> _Piece:
+def _piece(plant: Plant, index: int, name: str, ends: tuple[float, float], path: CutPath | None) -> _Piece:
     """Return a piece; the layer at the tip, and so every load, is the same in all of it."""
     case = load_case(_unturned(plant.scene) if name == "tip_direction" else plant.scene, 0.5 * (ends[0] + ends[1]), 0.0)
     acting = np.concatenate([case.forces, case.clamp])
@@ -189,7 +194,12 @@ def _piece(plant: Plant, index: int, name: str, ends: tuple[float, float]) -> _P
 
     def answer(depth: float) -> tuple[float, float]:
         operators, points = plant.operators(depth, 0.0), plant.points(depth)
-        states = [static_state(plant, operators, points, loads, depth=depth, time=0.0) for loads in cases]
+        terms = rest_of(plant, None if path is None else path.up_to(depth), depth, 0.0)
+        pulls = None, None if terms is None else terms.load  # what the input does, it does on a frozen path
+        states = [
+            static_state(plant, operators, points, loads, depth=depth, time=0.0, rest_load=pull)
+            for loads, pull in zip(cases, pulls, strict=True)
+        ]
         gain, rest = (float(points.deflections(*state)[-1]) for state in states)
         return gain, rest
 

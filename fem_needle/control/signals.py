@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf
 
 from fem_needle.control.controller import Measurement
-from fem_needle.scene import LateralLoad, Scene, TipLoad, as_function
+from fem_needle.scene import Scene, TipLoad, as_function
 from fem_needle.scene.signals import IMAGE_ERROR
 
 Reader = Callable[[Measurement], float | None]
@@ -36,7 +36,7 @@ def own_value(scene: Scene, name: str, time: float = 0.0) -> float:
     if name == "tip_direction":
         value = next(load.direction for load in scene.loads if isinstance(load, TipLoad))
     elif name == "lateral_force":
-        value = next(load.force for load in scene.loads if isinstance(load, LateralLoad))
+        value = scene.lateral_loads[0].force
     else:
         value = getattr(scene.insertion if name in {"push_force", "speed"} else scene.support, name)
     return float(as_function(0.0 if value is None else value).value(time))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fem_needle.dynamics import names as ix
 from fem_needle.loads import turns_with_needle
 from fem_needle.motion import DepthLaw, Instant, depth_law
-from fem_needle.scene import LateralLoad, Scene, Sinusoid, Table, TipLoad, as_function
+from fem_needle.scene import Scene, Sinusoid, Table, TipLoad, as_function
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -129,7 +129,7 @@ def drive_of(scene: Scene) -> Drive:
 
 def load_rows(scene: Scene) -> list[Array]:
     """Return the rows of lateral forces, of the torque on a free hub, and of each tip load its force and its direction."""
-    found = [value_rows(load.force) for load in scene.loads if isinstance(load, LateralLoad)]
+    found = [value_rows(load.force) for load in scene.lateral_loads]
     if turns_with_needle(scene):
         found.append(value_rows(scene.support.hub_torque))
     for load in scene.loads:

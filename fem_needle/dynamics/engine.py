@@ -32,6 +32,7 @@ NUMBERS_OF_A_CALL = 400_000  # coordinates times steps: a fraction of a second, 
 
 SAMPLE_COLUMNS = {
     "time": at.R_TIME, "depth": at.R_DEPTH, "speed": at.R_SPEED, "push_force": at.R_PUSH, "friction_force": at.R_FRICTION,
+    "cutting_force": at.R_CUTTING, "axial_force": at.R_AXIAL,
     "tissue_force": at.R_TISSUE, "hub_force": at.R_HUB, "hub_moment": at.R_MOMENT, "kinetic_energy": at.R_KINETIC,
     "bending_energy": at.R_BENDING, "tissue_energy": at.R_ELASTIC, "guide_energy": at.R_GUIDE,
     "axial_kinetic_energy": at.R_INSERTION, "load_work": at.R_WORKS + at.LOAD_WORK, "hub_work": at.R_WORKS + at.HUB_WORK,
@@ -40,6 +41,7 @@ SAMPLE_COLUMNS = {
     "cutting_work": at.R_WORKS + at.CUTTING_WORK, "push_work": at.R_WORKS + at.PUSH_WORK,
     "arrest_loss": at.R_WORKS + at.ARREST_LOSS,
 }  # fmt: skip
+RECORD_PARTS = ("coordinates", "point_forces", "guide_force", "velocities", "accelerations")  # behind the numbers of a record
 
 
 class Engine:
@@ -116,7 +118,7 @@ class Engine:
         """
         work, cursor = self._work, self._work[at.CURSOR]
         rows = int(np.count_nonzero(intervals[:, 3] % 2)) + from_start
-        record = np.zeros((rows, at.RECORD + self.model.size + self.model.points + int(self.model.switches[at.GUIDES])))
+        record = np.zeros((rows, self.model.record_ends[-1]))
         if self.cuts:
             self.live.reserve(int(np.sum(intervals[:, 2])))
         work.put(at.INTERVALS, intervals)
@@ -138,18 +140,16 @@ class Engine:
                 row[at.R_HUB], row[at.R_MOMENT] = self.plant.clamp_reactions(residual, float(row[at.R_DEPTH]))
 
     def _samples(self, record: Array) -> Samples:
-        n, p = self.model.size, self.model.points
-        parts = np.split(record[:, at.RECORD :], [n, n + p], axis=1)
-        position, deflection = self.live.path_points()
+        parts = [np.ascontiguousarray(part) for part in np.split(record, self.model.record_ends[:-1], axis=1)[1:]]
+        position, deflection, cubics = self.live.path_points()
         pieces = record[:, at.R_PIECES].astype(np.int64)
         values: dict[str, Any] = {name: np.ascontiguousarray(record[:, column]) for name, column in SAMPLE_COLUMNS.items()}
         return Samples(
             **values,
-            coordinates=np.ascontiguousarray(parts[0]),
-            point_forces=np.ascontiguousarray(parts[1]),
-            guide_force=np.ascontiguousarray(parts[2]),
+            **dict(zip(RECORD_PARTS, parts, strict=True)),
             path_position=position,
             path_deflection=deflection,
+            path_cubics=cubics,
             path_points=np.where(pieces > 0, pieces + 2, 0),
         )
 

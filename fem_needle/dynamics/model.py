@@ -6,6 +6,7 @@ Enters: a plant on shapes that are polynomials on pieces. Leaves: `Model`, whose
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import accumulate
 from math import comb
 from typing import Any, TypeGuard
 from weakref import WeakKeyDictionary
@@ -50,6 +51,12 @@ class Model:
     def switches(self) -> Integers:
         """Whole numbers of the needle."""
         return self.arrays[at.SWITCH]
+
+    @property
+    def record_ends(self) -> tuple[int, ...]:
+        """Where the parts of a record end: numbers, coordinates, point forces, guides, velocities, accelerations."""
+        sizes = (at.RECORD, self.size, self.points, int(self.switches[at.GUIDES]), self.size, self.size)
+        return tuple(accumulate(sizes))
 
 
 # Made once for each needle; gone with it.

@@ -105,13 +105,15 @@ AXIAL = 23
 ) = range(9)
 LEDGER = 9
 
-# record: what is kept of an output; coordinates, point forces and guides' shown forces follow.
+# record: what is kept of an output; coordinates, point forces, guides' shown forces and the coordinates' first and second
+# derivatives in time follow.
 (
     R_TIME,
     R_DEPTH,
     R_SPEED,
     R_PUSH,
     R_FRICTION,
+    R_CUTTING,
     R_TISSUE,
     R_HUB,
     R_MOMENT,
@@ -124,7 +126,7 @@ LEDGER = 9
     R_TIP,
     R_PIECES,
     R_WORKS,
-) = range(17)
+) = range(18)
 RECORD = R_WORKS + LEDGER
 
 # sums of an instant, kept for the ledger.

@@ -65,6 +65,21 @@ def shown_velocity(arrays, at, count, h):
 
 
 @inner
+def keep_rates(arrays, at, count, h, row):
+    """Set the rates of the coordinates, which the second work vector holds, and with inertia their accelerations."""
+    velocity, rates = floats_2(arrays, ix.VECTORS)[1], floats_2(arrays, ix.RATES)
+    slopes = floats_2(arrays, ix.METHOD)[ix.START_SLOPE if at == ix.START else ix.END_SLOPE]
+    n = len(velocity)
+    first = ix.RECORD + n + floats_2(arrays, ix.FORCES).shape[1] + integers_1(arrays, ix.SWITCH)[ix.GUIDES]
+    for i in range(n):
+        row[first + i], acceleration = velocity[i], 0.0
+        if integers_1(arrays, ix.SWITCH)[ix.INERTIA]:
+            for node in range(count):
+                acceleration += slopes[node] / h * (rates[node, i] - rates[ix.START, i])
+        row[first + n + i] = acceleration
+
+
+@inner
 def keep_output(arrays, at, count, h, deepest, row):
     """Set a row of the record from an instant, the end or the start of a step of length h with ``count`` nodes."""
     switches, numbers, course = integers_1(arrays, ix.SWITCH), floats_1(arrays, ix.NUMBER), floats_2(arrays, ix.COURSES)[at]
@@ -75,9 +90,11 @@ def keep_output(arrays, at, count, h, deepest, row):
     row[ix.R_FRICTION] = friction_force(numbers, depth, speed)
     row[ix.R_AXIAL] = axial_force(arrays, at, count, h)
     row[ix.R_PUSH] = mass * course[ix.ACCELERATION] + row[ix.R_FRICTION] - row[ix.R_AXIAL]
-    row[ix.R_PUSH] += cutting_force(floats_2(arrays, ix.LAYER), depth, speed, deepest)
+    row[ix.R_CUTTING] = cutting_force(floats_2(arrays, ix.LAYER), depth, speed, deepest)
+    row[ix.R_PUSH] += row[ix.R_CUTTING]
     shown_velocity(arrays, at, count, h)
     set_reactions(arrays, at, count, h, floats_2(arrays, ix.VECTORS)[1], row)
+    keep_rates(arrays, at, count, h, row)
     row[ix.R_KINETIC], row[ix.R_BENDING] = kinetic_energy(arrays, at), bending_energy(arrays, at)
     row[ix.R_GUIDE] = 0.0
     for guide in range(guides):
@@ -92,9 +109,10 @@ def keep_output(arrays, at, count, h, deepest, row):
         row[ix.RECORD + i] = q[i]
     for point in range(points):
         row[ix.RECORD + n + point] = forces[at, point]
+    ends_at_node = floats_2(arrays, ix.METHOD)[ix.PLACES, count - 1] == 1.0
     for guide in range(guides):  # of a rigid guide the mean over the step, about which its multiplier alternates
         shown = forces[at, guide]
-        if switches[ix.INERTIA] and compliance[guide] == 0.0:
+        if switches[ix.INERTIA] and compliance[guide] == 0.0 and not ends_at_node:
             shown = 0.0
             for node in range(count):
                 shown += weights[node] * forces[node, guide]

@@ -97,12 +97,12 @@ class LiveState:
         for array, kept in zip(self.path, state.path, strict=False):
             array[: len(kept)] = kept
 
-    def path_points(self) -> tuple[Array, Array]:
-        """Return y [m] and r [m] at the jump (both sides) and at the end of every piece; empty before anything is cut."""
+    def path_points(self) -> tuple[Array, Array, Array]:
+        """Return y [m] and r [m] at the jump (both sides) and at the pieces' ends, and the pieces' powers; all may be empty."""
         count = self.pieces
         if not count:
-            return np.zeros(0), np.zeros(0)
+            return np.zeros(0), np.zeros(0), np.zeros((0, 4))
         edges, cubics = self.path[0][: count + 1], self.path[1][:count]
         spans = np.diff(edges)[:, None] ** np.arange(4)
         y = np.concatenate([edges[:1], edges])
-        return y, np.concatenate([[0.0, cubics[0, 0]], np.sum(cubics * spans, axis=1)])
+        return y, np.concatenate([[0.0, cubics[0, 0]], np.sum(cubics * spans, axis=1)]), cubics.copy()

@@ -109,14 +109,19 @@ def finish(arrays):
 
 @inner
 def set_end_forces(arrays, count):
-    """Set the forces at the points at the end of a step of ``count`` nodes: rigid guides keep their mean over it."""
+    """Set the forces at the points at the end of a step of ``count`` nodes: those of the last node where that is the end.
+
+    Else rigid guides keep their mean over the step, about which their multipliers alternate.
+    """
     switches, forces, held = integers_1(arrays, ix.SWITCH), floats_2(arrays, ix.FORCES), floats_1(arrays, ix.HELD)
-    guides, weights = switches[ix.GUIDES], floats_2(arrays, ix.METHOD)[ix.WEIGHTS]
+    guides, method = switches[ix.GUIDES], floats_2(arrays, ix.METHOD)
+    ends_at_node = method[ix.PLACES, count - 1] == 1.0
     for guide in range(guides):
         forces[ix.END, guide] = 0.0
         for node in range(count):
-            forces[ix.END, guide] += weights[node] * forces[node, guide]
-    if guides:
+            share = (1.0 if node == count - 1 else 0.0) if ends_at_node else method[ix.WEIGHTS, node]
+            forces[ix.END, guide] += share * forces[node, guide]
+    if guides and not ends_at_node:
         soft_reactions(
             switches, floats_1(arrays, ix.NUMBER)[ix.SOFTEST], floats_3(arrays, ix.POINT_ROWS)[ix.END],
             integers_2(arrays, ix.POINT_FIRST)[ix.END], floats_3(arrays, ix.FLEXIBLE)[ix.END], floats_1(arrays, ix.COMPLIANCE),

@@ -20,7 +20,7 @@ from fem_needle.ledger import StepEnd
 from fem_needle.loads import is_steady, load_case, turns_with_needle
 from fem_needle.motion import depth_law, wanted_radius
 from fem_needle.plant import Plant
-from fem_needle.sample_arrays import SINCE_START, Samples
+from fem_needle.sample_arrays import NO_PATH, SINCE_START, Samples
 from fem_needle.scene import Scene
 from fem_needle.stages import StageSolution, evaluate_stage
 from fem_needle.statics import static_state
@@ -166,28 +166,28 @@ def vibration_samples(vibration: Vibration, times: Array) -> Samples:
     return Samples(
         time=times.copy(),
         depth=np.full(count, stage.instant.depth),
-        speed=none,
         coordinates=coordinates,
+        velocities=velocities,
+        accelerations=accelerations,
         point_forces=forces,
         guide_force=np.zeros((count, 0)),
         push_force=-axial_forces,
-        friction_force=none,
+        axial_force=axial_forces,
         tissue_force=-held @ plant.deflection_at_one,
         hub_force=hub[:, 0],
         hub_moment=hub[:, 1],
         kinetic_energy=kinetic,
         bending_energy=0.5 * (bending + kinks),
         tissue_energy=0.5 * np.sum(coordinates * held, axis=1),
-        guide_energy=none,
         load_work=np.sum(forces * moved, axis=1),
-        path_position=np.zeros(0),
-        path_deflection=np.zeros(0),
+        **NO_PATH,
         path_points=np.zeros(count, dtype=np.int64),
         **dict.fromkeys(_NEVER, none),
     )
 
 
-_NEVER = ("axial_kinetic_energy", *(name for name in SINCE_START if name != "load_work"))
+_WORKS = (name for name in SINCE_START if name != "load_work")
+_NEVER = ("speed", "friction_force", "cutting_force", "guide_energy", "axial_kinetic_energy", *_WORKS)
 
 
 def _products(band: Array, vectors: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from fem_needle.errors import SceneError
 from fem_needle.exact.matching import BeamProblem, BeamSolution, solve_beam
 from fem_needle.limits import stations_on
-from fem_needle.scene import Guide, LateralLoad, Scene, TipLoad
+from fem_needle.scene import Guide, Scene, TipLoad
 from fem_needle.scene.time_functions import as_function
 
 
@@ -225,7 +225,7 @@ def _tip_load_force(load: TipLoad, scene: Scene, depth: float, time: float) -> f
 
 def _lateral_forces(scene: Scene, time: float) -> list[tuple[float, float]]:
     """Position [m] and value [N] of the lateral forces."""
-    return [(load.position, as_function(load.force).value(time)) for load in scene.loads if isinstance(load, LateralLoad)]
+    return [(load.position, as_function(load.force).value(time)) for load in scene.lateral_loads]
 
 
 def _refuse_impossible(scene: Scene, depth: float) -> None:
@@ -236,7 +236,7 @@ def _refuse_impossible(scene: Scene, depth: float) -> None:
     if not (0.0 < depth <= length if smallest_open else 0.0 <= depth <= length):
         raise SceneError(f"depth: not on the needle (got {depth:g}; allowed 0 to {length:g} m)")
     held = [guide.position for guide in scene.support.guides]
-    held += [load.position for load in scene.loads if isinstance(load, LateralLoad)]
+    held += [load.position for load in scene.lateral_loads]
     for y in held:
         if not depth - length < y <= depth:
             where = f"a guide or lateral force at y = {y:g} m is not on the needle"

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fem_needle.axial import cutting_forces
 from fem_needle.closed_loop.units import shown_unit
 from fem_needle.figures.common import (
     ABOVE,
@@ -32,7 +31,7 @@ Array = NDArray[np.float64]
 
 WIDTH, PANEL_HEIGHT = 8.0, 2.0  # inches
 THIN = 0.8  # points: lines of curves that turn very often
-MOST_GUIDES = 3  # that have a line of their own
+MOST_POINTS = 3  # that have a line of their own
 LEAST_FORCE = 0.05  # of a unit, that a panel shows in it
 COMMAND = "command_"
 
@@ -102,7 +101,8 @@ def draw_panel(axes: Axes, panel: Panel, run: Trajectory) -> None:
 def _panels(run: Trajectory) -> tuple[Panel, ...]:
     unit, name = deflection_unit(run)
     hub = {} if _all_zero(run.hub_force) else {"hub" if run.scene.support.kind == "hub" else "clamp": run.hub_force}
-    lateral = {"tissue": run.tissue_force} | hub | _guides(run)
+    applied = {} if _all_zero(np.nan_to_num(run.tip_force)) else {"tip": run.tip_force}
+    lateral = {"tissue": run.tissue_force} | hub | _many(run.guide_force, "guide") | _many(run.lateral_force, "load") | applied
     return (
         Panel("Tip", f"tip [{name}]", {"deflection": unit * run.tip_deflection}),
         Panel("Insertion", "depth [mm]", {"depth": MILLIMETERS * run.depth}),
@@ -114,15 +114,13 @@ def _panels(run: Trajectory) -> tuple[Panel, ...]:
 def axial_forces(run: Trajectory) -> dict[str, Array]:
     """Return push, friction and cutting [N] over the time, by name; of a push also what holds the needle while it rests.
 
-    The cutting force is that of the layer which holds the tip while the tip advances at its deepest, as the scene says. What
-    the three leave over is the needle's own axial force, and inertia.
+    What the three leave over is the needle's own axial force, and inertia.
     """
     friction, found = run.friction_force, {"push": run.push_force}
     resting = (run.speed == 0.0) & (friction != 0.0)
     found["friction"] = np.where(resting, np.nan, friction)
-    cutting = cutting_forces(run.scene, run.depth, run.speed, np.maximum.accumulate(run.depth))
-    if np.any(cutting):
-        found["cutting"] = np.where(resting, np.nan, cutting)
+    if np.any(np.nan_to_num(run.cutting_force)):
+        found["cutting"] = np.where(resting, np.nan, run.cutting_force)
     if np.any(resting):
         found["hold at rest"] = np.where(resting, friction, np.nan)
     return found
@@ -133,12 +131,12 @@ def _forces(title: str, curves: dict[str, Array]) -> Panel:
     return Panel(title, f"force [{unit}]", {name: values / size for name, values in curves.items()})
 
 
-def _guides(run: Trajectory) -> dict[str, Array]:
-    """Return the force of each guide, of many guides their sum."""
-    count = run.guide_force.shape[1]
-    if count > MOST_GUIDES:
-        return {f"{count} guides together": np.sum(run.guide_force, axis=1)}
-    return {"guide" if count == 1 else f"guide {index + 1}": run.guide_force[:, index] for index in range(count)}
+def _many(forces: Array, name: str) -> dict[str, Array]:
+    """Return the forces (nt, count) of guides or loads one by one, of many their sum."""
+    count = forces.shape[1]
+    if count > MOST_POINTS:
+        return {f"{count} {name}s together": np.sum(forces, axis=1)}
+    return {name if count == 1 else f"{name} {index + 1}": forces[:, index] for index in range(count)}
 
 
 def _command_panels(run: Trajectory) -> tuple[Panel, ...]:

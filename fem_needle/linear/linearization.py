@@ -15,10 +15,12 @@ from fem_needle.errors import SceneError
 from fem_needle.linear.depth_rates import numerical_rate
 from fem_needle.linear.guided_motion import Coordinates, Guided, guided, independent_coordinates
 from fem_needle.linear.model import LinearModel, SecondOrder, Signal
+from fem_needle.linear.slow_cut import slow_cut
 from fem_needle.linear.small_motion import OperatingPoint, SmallMotion, operating_point, small_motion
 from fem_needle.loads import turns_with_needle
+from fem_needle.path import CutPath
 from fem_needle.plant import Plant
-from fem_needle.scene import LateralLoad, Scene
+from fem_needle.scene import Scene
 from fem_needle.threads import one_thread
 
 Array = NDArray[np.float64]
@@ -27,7 +29,13 @@ Axial = Literal["free", "held"]
 
 @one_thread
 def linearize(
-    plant: Plant, *, depth: float, time: float = 0.0, speed: float = 0.0, axial: Axial = "free"
+    plant: Plant,
+    *,
+    depth: float,
+    time: float = 0.0,
+    speed: float = 0.0,
+    axial: Axial = "free",
+    path: CutPath | None = None,
 ) -> LinearModel:
     """Return the linear model of a needle about its equilibrium at a depth.
 
@@ -46,6 +54,9 @@ def linearize(
         speed, what grows with depth) is in the model, so at rest it is that of a needle that slides, without the
         threshold that would hold it. "held": the depth is what it is, as under friction that sticks or an insertion that
         is prescribed.
+    path
+        Of a scene whose tissue rests on the cut path: the path, frozen, as a run's ``samples.path_at(row)`` gives it; default:
+        what a slow insertion cuts under the loads of ``time``.
 
     Returns
     -------
@@ -56,13 +67,15 @@ def linearize(
     Raises
     ------
     SceneError
-        If depth or ``axial`` is out of range, the rest line is a cut path, or a needle moves in rigid guides.
+        If depth or ``axial`` is out of range, a path is given where tissue rests on a straight line, or a needle moves in
+        rigid guides.
     ComputationError
         If there is no equilibrium.
     """
-    _check(plant, depth, speed, axial)
+    _check(plant, depth, speed, axial, path)
     moves = axial == "free"
-    point = operating_point(plant, depth=depth, time=time, speed=speed)
+    frozen = slow_cut(plant, depth, time) if path is None else path.up_to(depth)
+    point = operating_point(plant, depth=depth, time=time, speed=speed, path=frozen)
     motion = small_motion(plant, point, moves=moves)
     guides = guided(motion, plant.prescribed)
     motion = _with_springs(motion, guides)
@@ -90,7 +103,7 @@ def with_lateral_force(scene: Scene, position: float) -> Scene:
     SceneError
         If the scene cannot have one there.
     """
-    if any(isinstance(load, LateralLoad) and load.position == position for load in scene.loads):
+    if any(load.position == position for load in scene.lateral_loads):
         return scene
     data = scene.to_dict()
     loads = [*data.get("loads", []), {"kind": "lateral", "position": position, "force": 0.0}]
@@ -99,11 +112,11 @@ def with_lateral_force(scene: Scene, position: float) -> Scene:
 
 def reach(scene: Scene) -> float:
     """Return the largest depth [m] at which the hub has met neither guide nor lateral load."""
-    loads = [load.position for load in scene.loads if isinstance(load, LateralLoad)]
+    loads = [load.position for load in scene.lateral_loads]
     return scene.needle.length + min([0.0, *loads, *(guide.position for guide in scene.support.guides)])
 
 
-def _check(plant: Plant, depth: float, speed: float, axial: str) -> None:
+def _check(plant: Plant, depth: float, speed: float, axial: str, path: CutPath | None) -> None:
     mistakes = []
     least, length = plant.smallest_depth, reach(plant.scene)
     if not (0.0 < depth <= length and depth >= least):
@@ -114,9 +127,8 @@ def _check(plant: Plant, depth: float, speed: float, axial: str) -> None:
         mistakes.append(f"axial: is not a choice (got {axial!r}; allowed 'free', 'held')")
     if speed and any(guide.stiffness == "rigid" for guide in plant.scene.support.guides):
         mistakes.append(f"speed: a needle moves in rigid guides (got {speed:g} m/s; allowed 0, or guides with a stiffness)")
-    if plant.scene.tissue.rest_line != "straight":
-        message = "remembers where the tip was and has no linear model"
-        mistakes.append(f"tissue.rest_line: {message} (got {plant.scene.tissue.rest_line!r}; allowed 'straight')")
+    if path is not None and plant.scene.tissue.rest_line != "cut-path":
+        mistakes.append("path: the tissue rests on a straight line (got a path; allowed with tissue.rest_line = 'cut-path')")
     if mistakes:
         raise SceneError(mistakes)
 
@@ -217,7 +229,7 @@ class _Names:
 
     @property
     def inputs(self) -> tuple[Signal, ...]:
-        count = sum(isinstance(load, LateralLoad) for load in self.scene.loads)
+        count = len(self.scene.lateral_loads)
         lateral = ["lateral_force"] if count == 1 else [f"lateral_force_{number}" for number in range(1, count + 1)]
         names = [Signal("push", "N")] if self.moves else []
         names += [Signal(name, "N") for name in lateral]

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from fem_needle import axial, banded
 from fem_needle.linear.depth_rates import kinetic_matrix_rates, numerical_rate
+from fem_needle.path import CutPath
 from fem_needle.plant import Operators, Plant, Points
-from fem_needle.statics import depth_derivative, solve_static
+from fem_needle.statics import depth_derivative, rest_of, solve_static
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,8 @@ class OperatingPoint:
         At guides, lateral loads and tip [N].
     tip_deflection
         [m].
+    path
+        What the tissue rests on, frozen; None: a straight line.
     push_force
         That keeps the speed [N]; at rest without friction, which may take any value up to its threshold.
     """
@@ -50,6 +53,7 @@ class OperatingPoint:
     point_forces: Array
     tip_deflection: float
     push_force: float = 0.0
+    path: CutPath | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,21 +95,23 @@ class _Dense:
     velocity_error: Array
 
 
-def operating_point(plant: Plant, *, depth: float, time: float, speed: float) -> OperatingPoint:
-    """Return the equilibrium at a depth [m] under the loads of a time [s], passed with a speed [m/s].
+def operating_point(
+    plant: Plant, *, depth: float, time: float, speed: float, path: CutPath | None = None
+) -> OperatingPoint:
+    """Return the equilibrium at a depth [m] under the loads of a time [s], passed with a speed [m/s], on a path.
 
     Raises
     ------
     ComputationError
         If there is no equilibrium.
     """
-    rest, is_wrong = solve_static(plant, depth=depth, time=time), _has_mistakes(plant, depth, time)
+    rest, is_wrong = solve_static(plant, depth=depth, time=time, path=path), _has_mistakes(plant, depth, time)
     zero = np.zeros(plant.size)
     point = OperatingPoint(
-        depth, speed, time, rest.coordinates, zero, zero, rest.point_forces, rest.tip_deflection, 0.0
+        depth, speed, time, rest.coordinates, zero, zero, rest.point_forces, rest.tip_deflection, 0.0, path
     )
     if speed:
-        point = replace(point, velocities=speed * depth_derivative(plant, rest)[0])
+        point = replace(point, velocities=speed * depth_derivative(plant, rest, path)[0])
     if speed or is_wrong:
         point = replace(point, accelerations=_accelerations(plant, point))
     return replace(point, push_force=_push_force(plant, point))
@@ -187,6 +193,9 @@ def _at_rest(plant: Plant, point: OperatingPoint, dense: _Dense, points: Points)
     weight = scene.needle.mass_per_length * scene.needle.length
     carried, dragged = dense.convection @ q, dense.drag @ q
     pulled = plant.stiffness_rate_product(q, point.depth, point.time) - points.row_rates.T @ point.point_forces
+    terms = rest_of(plant, point.path, point.depth, point.time)
+    if terms is not None:
+        pulled = pulled - terms.load_rate
     friction = axial.viscous_coefficient(scene, point.depth)
     return (
         _bordered(weight + float(q @ dense.centrifugal @ q), carried, carried, dense.mass),
@@ -232,6 +241,9 @@ def _accelerations(plant: Plant, point: OperatingPoint) -> Array:
     """Return the q'' of the operating point at constant speed; the clamp rests."""
     operators, points, clamped = plant.operators(point.depth, point.time), plant.points(point.depth), plant.prescribed
     force = points.rows.T @ point.point_forces - banded.multiply(operators.stiffness, point.coordinates)
+    terms = rest_of(plant, point.path, point.depth, point.time)
+    if terms is not None:
+        force += terms.load
     force -= _moving_forces(plant, point, point.depth)
     result = np.zeros(plant.size)
     result[clamped:] = operators.mass_factorization.solve(force[clamped:])
@@ -243,6 +255,9 @@ def _rate_of_energy(plant: Plant, point: OperatingPoint, depth: float) -> float:
     q, forces, points = point.coordinates, point.point_forces, plant.points(depth)
     result = 0.5 * float(q @ plant.stiffness_rate_product(q, depth, point.time))
     result -= float(forces @ (points.row_rates @ q) + 0.5 * forces @ points.flexibility_rate @ forces)
+    terms = rest_of(plant, point.path, depth, point.time)
+    if terms is not None:
+        result += terms.constant_rate - float(q @ terms.load_rate)
     if point.speed:
         result += _moving_energy_rate(plant, plant.operators(depth, point.time), point, depth)
     return result

@@ -124,7 +124,7 @@ def _mesh_mistakes(scene: Scene) -> Iterator[Mistake]:
 def input_obstacle(scene: Scene, name: str) -> str | None:
     """Return why a scene has no such input, None where it has."""
     support, is_hub = scene.support, scene.support.kind == "hub"
-    lateral = sum(isinstance(load, LateralLoad) for load in scene.loads)
+    lateral = len(scene.lateral_loads)
     free = support.hub_rotation == "free"
     obstacles = {
         "push_force": (scene.insertion.kind == "force", "needs insertion.kind = 'force'"),

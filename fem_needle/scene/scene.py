@@ -13,7 +13,7 @@ from fem_needle.errors import SceneError
 from fem_needle.scene.card import scene_card
 from fem_needle.scene.cross_checks import cross_mistakes
 from fem_needle.scene.insertion import Insertion
-from fem_needle.scene.loads import Load
+from fem_needle.scene.loads import LateralLoad, Load
 from fem_needle.scene.mistakes import check_path, mistake_lines
 from fem_needle.scene.needle import Needle
 from fem_needle.scene.part import MOST_ENTRIES, Part, raise_mistakes, shown
@@ -61,6 +61,11 @@ class Scene(Shown, Part):
 
     def _card(self) -> Card:
         return scene_card(self)
+
+    @property
+    def lateral_loads(self) -> tuple[LateralLoad, ...]:
+        """The lateral loads, in their order."""
+        return tuple(load for load in self.loads if isinstance(load, LateralLoad))
 
     @property
     def duration(self) -> float:

@@ -65,6 +65,7 @@ RANKS = {
     "dynamics": 8.5,
     "skipping": 9,
     "inertia_effect": 11,
+    "section_forces": 10,
     "trajectory": 11,
     "run_parts": 11.5,
     "choices": 12,

@@ -186,7 +186,6 @@ def test_json_and_a_lateral_force_that_the_scene_has_not(command):
         (("thesis", "--lateral-position", "-5mm"), "lateral"),
         (("brachytherapy", "--depth", "180mm"), "0.17 m"),
         (("brachytherapy", "--speed", "10mm/s"), "guides"),
-        (("thesis", "--set", "tissue.rest_line=cut-path"), "rest_line"),
         (("thesis", "--model", "magic"), "model.kind"),
         (("nothing-there",), "no file"),
     ],

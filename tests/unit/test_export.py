@@ -17,7 +17,7 @@ from scipy.io import loadmat
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
-from fem_needle import Guide, Insertion, Scene, Support, Trajectory, load_scene, matlab_file, run_scene
+from fem_needle import Guide, Insertion, Scene, Support, Trajectory, matlab_file, run_scene
 from fem_needle.errors import ComputationError, SceneError
 from fem_needle.export import FORMATS, export_run
 from fem_needle.run_folder import load_run, save_run
@@ -64,7 +64,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 def test_csv(folder, computed, export):
     status, out, err = export(folder, "--format", "csv")
     assert (status, err) == (0, "")
-    assert out.splitlines() == [f"wrote {folder / 'series.csv'}", f"wrote {folder / 'deflection.csv'}"]
+    names = ["series", "deflection", "bending_moment", "shear_force", "curvature", "bending_stress"]
+    assert out.splitlines() == [f"wrote {folder / name}.csv" for name in names]
     with (folder / "series.csv").open(newline="", encoding="utf-8") as file:
         header, *rows = csv.reader(file)
     table = np.array(rows, dtype=float)
@@ -81,9 +82,9 @@ def test_csv(folder, computed, export):
 def test_the_csv_of_the_deflection(folder, computed, export):
     assert export(folder, "--format", "csv")[0] == 0
     header, *rows = (folder / "deflection.csv").read_text().splitlines()
-    assert header.startswith("time [s],0.0 [m],0.005 [m],")
+    assert header.startswith("time [s],0 [m],0.005 [m],") and max(map(len, header.split(","))) < 12
     stations = [float(cell.removesuffix(" [m]")) for cell in header.split(",")[1:]]
-    np.testing.assert_array_equal(stations, computed.arc_length)
+    np.testing.assert_allclose(stations, computed.arc_length, rtol=1e-11)
     table = np.array([row.split(",") for row in rows], dtype=float)
     np.testing.assert_array_equal(table, np.column_stack((computed.time, computed.station_deflection)))
 
@@ -146,7 +147,7 @@ def frames_in_time(path: Path) -> list[tuple[float, pyvista.PolyData]]:
 def test_vtkhdf_has_the_needle_of_every_time(folder, computed, export):
     status, out, err = export(folder, "--format", "vtkhdf")
     assert (status, out) == (0, f"wrote {folder / 'deflection.vtkhdf'}\n")
-    assert "note: bending_moment and shear_force" in err
+    assert err == ""
     found = frames_in_time(folder / "deflection.vtkhdf")
     assert [time for time, _ in found] == computed.time.tolist()
     for row, (_, needle) in enumerate(found):
@@ -182,38 +183,17 @@ def test_vtkhdf_and_pvd_show_the_same(folder, export):
 def test_pvd_of_a_run_without_frames(folder, computed, tmp_path, export):
     status, out, err = export(folder, "--format", "pvd")
     assert (status, out) == (0, f"wrote {folder / 'deflection.pvd'}\n")
-    assert "spline through the stations" in err
+    assert err == ""
     whole = save_run(computed, tmp_path / "whole")
     again, first = (pyvista.PVDReader(path / "deflection.pvd") for path in (folder, whole))
     np.testing.assert_array_equal(again.time_values, computed.time)
     assert [item.path for item in again.datasets] == [item.path for item in first.datasets]
     for row in range(len(computed.time)):
         rebuilt, exact = (pyvista.read(path / f"needle/{row:06d}.vtp") for path in (folder, whole))
-        for name in ("deflection", "tissue_reaction", "layer", "radius"):
+        assert set(rebuilt.array_names) == set(exact.array_names)
+        for name in exact.array_names:
             np.testing.assert_array_equal(rebuilt[name], exact[name])
         assert (folder / f"tissue/{row:06d}.vtu").read_bytes() == (whole / f"tissue/{row:06d}.vtu").read_bytes()
-
-
-def worst(rebuilt: list[np.ndarray], exact: list[np.ndarray]) -> float:
-    return float(np.max(np.abs(np.array(rebuilt) - exact)) / np.max(np.abs(exact)))
-
-
-@pytest.mark.parametrize(
-    ("name", "moment", "shear"),
-    [("thesis", 4e-3, 0.05), ("bench-m2", 4e-3, 0.05), ("bench-d", 4e-3, None), ("misra-2010", 0.05, None)],
-)
-def test_how_good_rebuilt_moments_are(tmp_path, export, name, moment, shear):
-    """As docs/contract.md says; the frames of the run itself are the reference."""
-    given = load_scene(name)
-    run = run_scene(given, elements=32, output_step=given.duration / 5, tolerance=1e-2)
-    folder = save_run(run, tmp_path / "run")
-    assert export(folder, "--format", "pvd", "--out", tmp_path / "again")[0] == 0
-    names = [f"needle/{row:06d}.vtp" for row in range(len(run.time))]
-    frames = [[pyvista.read(path / name) for name in names] for path in (tmp_path / "again", folder)]
-    for array, limit in (("bending_moment", moment), ("shear_force", shear)):
-        rebuilt, exact = ([frame[array] for frame in side] for side in frames)
-        assert np.max(np.abs(exact)) > 0
-        assert limit is None or 0 < worst(rebuilt, exact) < limit
 
 
 def test_a_loaded_run_under_a_hub_bends_from_the_hub_on(folder, computed):

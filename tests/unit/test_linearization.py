@@ -13,6 +13,7 @@ from fem_needle.linear.linearization import linearize, with_lateral_force
 from fem_needle.linear.small_motion import operating_point
 from fem_needle.loads import LoadCase, load_case
 from fem_needle.motion import Instant
+from fem_needle.path import straight_path
 from fem_needle.scene import Friction, Guide, LateralLoad, Layer, Model, TipLoad
 from fem_needle.stages import StageSolution, evaluate_stage, internal_force, momentum
 from reduced_model import AssumedModeNeedle
@@ -331,7 +332,7 @@ def test_wrong_input(changes, message):
 
 def test_what_has_no_linear_model_is_refused():
     with pytest.raises(SceneError, match="rest_line"):
-        linearize(plant_of(scene_of("hub", held(0.1), tissue={"rest_line": "cut-path"})), depth=0.1)
+        linearize(plant_of(SCENES["hub"]), depth=0.1, path=straight_path(0.05))
     with pytest.raises(SceneError, match="guides with a stiffness"):
         linearize(plant_of(load_scene("brachytherapy"), 10), depth=0.09, speed=0.01)
     with pytest.raises(SceneError, match="tip_deflection"):

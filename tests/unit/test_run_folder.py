@@ -113,8 +113,10 @@ DIMENSIONS = dict.fromkeys(VARIABLES, ("time",)) | {
     "time": ("time",),
     "arc_length": ("arc_length",),
     "guide": ("guide",),
-    "deflection": ("time", "arc_length"),
+    "load": ("load",),
+    **dict.fromkeys(("deflection", "bending_moment", "shear_force", "curvature", "bending_stress"), ("time", "arc_length")),
     "guide_force": ("time", "guide"),
+    "lateral_force": ("time", "load"),
     "path_position": ("path_position",),
     "path_deflection": ("path_position",),
 }
@@ -229,7 +231,9 @@ def test_frames_beyond_the_rows_of_the_series_are_dropped(tmp_path):
         time=run.time[:3],
         series={name: values[:3] for name, values in run.series.items()},
         guide_force=run.guide_force[:3],
+        lateral_force=run.lateral_force[:3],
         station_deflection=run.station_deflection[:3],
+        samples=run.samples.rows(slice(3)),
     )
     writer.finish(cut)
     assert len(frames_of(tmp_path / "one")) == len(list((tmp_path / "one").rglob("*.vt[pu]"))) == 6

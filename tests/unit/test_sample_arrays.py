@@ -25,14 +25,18 @@ def given() -> list[Sample]:
     random = np.random.default_rng(3)
     scalars = [field.name for field in fields(Sample) if field.type == "float"]
     path = random.normal(size=(2, max(PATH_POINTS)))
+    cubics = random.normal(size=(max(PATH_POINTS), 4))
     return [
         Sample(
             **(dict(zip(scalars, random.normal(size=len(scalars)).tolist(), strict=True)) | {"time": 0.1 * row}),
             coordinates=random.normal(size=5),
+            velocities=random.normal(size=5),
+            accelerations=random.normal(size=5),
             point_forces=random.normal(size=2),
             guide_force=random.normal(size=1),
             path_position=path[0, :points],
             path_deflection=path[1, :points],
+            path_cubics=cubics[: max(points - 2, 0)],
         )
         for row, points in enumerate(PATH_POINTS)
     ]
@@ -49,8 +53,10 @@ def test_rows_are_the_samples(given):
         for name in OVER_TIME:
             if name != "path_points":
                 assert np.array_equal(getattr(found, name)[row], getattr(sample, name))
-        for found_path, path in zip(found.path_at(row), (sample.path_position, sample.path_deflection), strict=True):
-            assert np.array_equal(found_path, path)
+        if len(sample.path_position):
+            path = found.path_at(row)
+            assert np.array_equal(path.edges, sample.path_position[1:]) and path.front == sample.path_deflection[-1]
+            assert np.array_equal(path.coefficients, sample.path_cubics)
     assert found.coordinates.shape == (6, 5) and found.guide_force.shape == (6, 1) and found.push_force.shape == (6,)
     assert np.array_equal(found.lateral_energy, found.kinetic_energy + found.bending_energy + found.tissue_energy)
 
@@ -167,11 +173,11 @@ def test_the_frame_of_a_row_has_its_own_path():
     frames = frames_of_samples(run.plant, found, run.arc_length)
     assert np.array_equal([frame.time for frame in frames], run.time)
     for row, frame in enumerate(frames):
-        assert np.array_equal(frame.path_position, run.path_position[: found.path_points[row]])
-        assert np.array_equal(frame.path_deflection, run.path_deflection[: found.path_points[row]])
-        assert np.all(frame.path_position <= frame.depth)
+        if found.path_points[row]:
+            assert np.array_equal(frame.path.edges, run.path_position[1 : found.path_points[row]])
+            assert np.all(frame.path.edges <= frame.depth)
         assert np.array_equal(frame.deflection, run.station_deflection[row])
-    assert frames[-1].path_position[-1] == pytest.approx(0.09, rel=1e-12)
+    assert frames[-1].path.deepest == pytest.approx(0.09, rel=1e-12)
 
 
 class Keeps:

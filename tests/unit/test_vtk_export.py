@@ -10,6 +10,7 @@ import pytest
 import pyvista
 
 from fem_needle import FiniteElementNeedle, Insertion, Layer, Needle, Scene, Sinusoid, Tissue, run_scene, solve_static
+from fem_needle.path import straight_path
 from fem_needle.run_folder import save_run
 from fem_needle.tissue_block import MOST_POINTS, tissue_block
 from fem_needle.vtk_export import Frame, VtkSeries, needle_arrays
@@ -100,8 +101,8 @@ def test_section_forces_are_those_of_a_cantilever(cantilever):
     assert np.count_nonzero(inside) == 20
     exact = force * x**2 * (3 * depth - x) / (6 * stiffness)
     np.testing.assert_allclose(needle["deflection"][inside, 1], exact[inside], rtol=1e-9)
-    np.testing.assert_allclose(needle["bending_moment"][inside], (force * (depth - x))[inside], rtol=1e-7, atol=1e-10)
-    np.testing.assert_allclose(needle["shear_force"][inside], -force, rtol=1e-6)
+    np.testing.assert_allclose(needle["bending_moment"][inside], (force * (depth - x))[inside], rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(needle["shear_force"][inside], -force, rtol=1e-12)
     outside = x < -1e-9
     for name in ("bending_moment", "shear_force"):
         np.testing.assert_array_equal(needle[name][outside], 0.0)
@@ -181,7 +182,7 @@ def test_a_layer_out_of_reach_is_not_drawn_to_its_far_side():
 
 def test_the_radius_is_that_of_the_section_or_one_to_see():
     numbers = np.zeros(3)
-    frame, stations = Frame(0.0, 0.1, numbers, numbers, numbers), np.linspace(0.0, 0.2, 3)
+    frame, stations = Frame(0.0, 0.1, numbers, numbers, numbers, straight_path(0.1)), np.linspace(0.0, 0.2, 3)
     given = Needle(length=0.2, youngs_modulus=2e11, second_moment_of_area=1e-13, area=np.pi * 1e-6, density=8e3)
     direct = Needle(length=0.2, bending_stiffness=0.02, mass_per_length=0.01)
     for needle, radius in ((given, 1e-3), (direct, 1e-3)):
@@ -195,7 +196,7 @@ def test_the_list_is_rewritten_often_but_not_at_every_one_of_many_frames(tmp_pat
     series = VtkSeries(tmp_path, Scene.from_dict(entry_data(tissue={"layers": []})), stations)
     listed = []
     for number in range(60):
-        series.add(Frame(0.1 * number, 0.1, *np.zeros((3, 3))))
+        series.add(Frame(0.1 * number, 0.1, *np.zeros((3, 3)), straight_path(0.1)))
         listed.append(len(pyvista.PVDReader(tmp_path / "deflection.pvd").datasets))
     assert listed[:19] == list(range(1, 20))
     assert all(number + 1 - found <= (number + 1) // 10 for number, found in enumerate(listed))
@@ -206,7 +207,7 @@ def test_the_list_is_rewritten_often_but_not_at_every_one_of_many_frames(tmp_pat
 
 def test_a_frame_that_is_broken_off_leaves_no_file(tmp_path, monkeypatch):
     series = VtkSeries(tmp_path, hub(), np.linspace(0.0, 0.2, 3))
-    series.add(Frame(0.0, 0.1, *np.zeros((3, 3))))
+    series.add(Frame(0.0, 0.1, *np.zeros((3, 3)), straight_path(0.1)))
 
     def interrupted(path, content):
         path.open("wb").close()
@@ -214,5 +215,5 @@ def test_a_frame_that_is_broken_off_leaves_no_file(tmp_path, monkeypatch):
 
     monkeypatch.setattr("pathlib.Path.write_bytes", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        series.add(Frame(1.0, 0.1, *np.zeros((3, 3))))
+        series.add(Frame(1.0, 0.1, *np.zeros((3, 3)), straight_path(0.1)))
     assert sorted(path.name for path in tmp_path.rglob("*.vt*")) == ["000000.vtp", "000000.vtu"]

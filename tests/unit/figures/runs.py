@@ -74,8 +74,8 @@ def cut_off(run: Trajectory, samples: int) -> Trajectory:
         station_deflection=run.station_deflection[:samples],
         summary=run.summary | {"stop_reason": "interrupted"},
         plant=None,
-        coordinates=None,
-        point_forces=None,
+        samples=None,
+        lateral_force=run.lateral_force[:samples],
     )
 
 

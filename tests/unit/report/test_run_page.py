@@ -258,10 +258,10 @@ def test_a_run_without_results_has_a_report(folder, tmp_path, summary):
 def test_a_scene_with_a_controller_that_did_not_act_says_so(run, folder):
     finger = {"kind": "lateral", "position": -0.01, "force": 0.0}
     loop = {"loads": [finger], "sensors": [{"kind": "tip-imaging"}], "controller": {"kind": "pid"}}
-    scene = run.scene.with_values(loop)
-    told = dict(section(of(replace(run, scene=scene), folder), "scene").paragraphs)
+    scene, none = run.scene.with_values(loop), np.zeros((len(run.time), 1))
+    told = dict(section(of(replace(run, scene=scene, lateral_force=none), folder), "scene").paragraphs)
     assert told["Open loop"] == "The scene's controller did not act in this run." and "pid" in told["Control"]
-    closed = replace(run, scene=scene, summary=run.summary | {"controller": {"kind": "pid"}})
+    closed = replace(run, scene=scene, lateral_force=none, summary=run.summary | {"controller": {"kind": "pid"}})
     assert "Open loop" not in dict(section(of(closed, folder), "scene").paragraphs)
 
 

@@ -280,9 +280,9 @@ def test_a_display_gets_a_window(view, monkeypatch):
     assert shown == [3]
 
 
-def test_a_loop_shows_what_was_commanded():
+def test_the_arrow_at_the_tip_shows_its_force():
     run = run_scene(load_scene("thesis").with_values({"numerics.output_step": 8.0}))
-    run.signals["command_tip_direction"] = np.array([1.0, -1.0, np.nan])
+    run.series["tip_force"] = np.array([0.1, -0.1, 0.1])  # as a loop turns it
     arranged = arrangement(run)
     poses = [arranged.pose(row) for row in range(3)]
     ways = [1 if pose.loads.points[:, 1].max() <= pose.tip[1] + 1e-9 else -1 for pose in poses]  # the arrow ends at the tip
