@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from itertools import pairwise
 from math import inf, pi
 
 from fem_needle.errors import SuspiciousValueWarning
@@ -11,10 +12,13 @@ from fem_needle.scene import Model, Scene, TipLoad
 from fem_needle.scene.listing import entries
 from fem_needle.scene.time_functions import Sinusoid, Table
 from fem_needle.scene.time_quantity import TimeValue, extremes
+from fem_needle.segments import interfaces, tip_layer
 
 EPOCH = 1e8  # s: three years
 FAST = 5.0  # m/s: no needle is that fast
 OLD_READINGS = 0.1  # a controller's period by that of the sensor it reads: below, it decides on old readings
+STATIONS = 200  # depths at which a push is judged
+CLAMPED_PINNED = 20.19  # EI / L^2: tan x = x at x = 4.4934, squared (Timoshenko, Theory of Elastic Stability)
 LONG_DELAY = 5.0  # a sensor's delay by the controller's period: above, several commands are on the way unseen
 
 NOT_YOUNGS_MODULUS = (
@@ -27,6 +31,17 @@ def suspicious(scene: Scene) -> tuple[str, ...]:
     """Return a message for each suspicious value; none for an ordinary scene."""
     checks = (_units, _needle, _layers, _push, _tip_force, _times, _tables, _model, _sensors, _feedback)
     return tuple(message for check in checks for message in check(scene))
+
+
+def notes(scene: Scene) -> tuple[str, ...]:
+    """Return what is no slip but may surprise: a message each, with the key to change."""
+    bevels = [index for index, load in enumerate(scene.loads) if getattr(load, "bevel_coefficient", None)]
+    if not bevels or scene.tissue.rest_line != "straight" or scene.insertion.kind == "hold":
+        return ()
+    return (
+        f"loads.{bevels[0]}.bevel_coefficient with tissue.rest_line = 'straight': the tissue pulls the needle back to the axis, "
+        "the tip stays near it at any depth; tissue.rest_line = 'cut-path' lets the needle follow the path that its bevel cuts",
+    )
 
 
 def warn_if_suspicious(scene: Scene) -> tuple[str, ...]:
@@ -82,31 +97,49 @@ def _layers(scene: Scene) -> Iterator[str]:
 
 
 def _push(scene: Scene) -> Iterator[str]:
-    """Compare the push, given or needed, with the Euler load of the free part.
-
-    The free part is taken as clamped at the hub and free at the skin:
-    P = pi^2 EI / (2 L)^2 [N].
-    """
-    free = scene.needle.length - scene.insertion.first_depth
-    push = _needed_push(scene)
-    euler = pi**2 * scene.needle.bending_stiffness / (2.0 * free) ** 2 if free > 0.0 else inf
+    """Compare the push, given or needed, with the Euler loads of the parts before the skin, at every depth on the way."""
+    if scene.support.kind == "entry":  # clamped at the skin
+        return
+    found = [(_needed_push(scene, depth), *_euler_load(scene, depth), depth) for depth in _depths(scene)]
+    push, euler, what, depth = max(found, key=lambda one: one[0] / one[1])
     if push > euler:
-        yield (
-            f"the push, {push:.3g} N > {euler:.3g} N, "
-            f"the Euler load pi^2 EI / (2 L)^2 of the free part (L = {free:g} m): the needle may buckle"
-        )
+        yield f"the push at {depth:.4g} m, {push:.3g} N > {euler:.3g} N, the Euler load {what}: the needle may buckle"
 
 
-def _needed_push(scene: Scene) -> float:
-    """Return the largest push, or the friction and cutting force that a prescribed motion has to overcome [N]."""
+def _depths(scene: Scene) -> list[float]:
+    """Return the depths of an insertion [m], those just inside each layer among them; of a given push the first alone."""
+    low, high = scene.insertion.depth_range(scene.duration)
+    if scene.insertion.push_force is not None:
+        return [scene.insertion.first_depth]
+    inside = [level for level in interfaces(scene.tissue.layers) if low <= level <= high]
+    return [low + (high - low) * part / STATIONS for part in range(STATIONS + 1)] + inside
+
+
+def _needed_push(scene: Scene, depth: float) -> float:
+    """Return the largest push, or the friction and cutting force that a prescribed motion overcomes at a depth [N]."""
     if scene.insertion.push_force is not None:
         return _largest(scene.insertion.push_force)
-    friction, depth = scene.friction, scene.insertion.first_depth
+    friction, layer = scene.friction, tip_layer(scene.tissue.layers, depth)
     speed = 0.0 if scene.insertion.speed is None else _largest(scene.insertion.speed)
     coulomb = friction.coulomb + friction.coulomb_per_length * depth
     viscous = friction.viscous + friction.viscous_per_length * depth
-    cutting = max((layer.cutting_force for layer in scene.tissue.layers), default=0.0)
-    return coulomb + viscous * speed + cutting
+    return coulomb + viscous * speed + (0.0 if layer is None else scene.tissue.layers[layer].cutting_force)
+
+
+def _euler_load(scene: Scene, depth: float) -> tuple[float, str]:
+    """Return the smallest Euler load of the parts between hub, rigid guides and skin at a depth [N], and which part that is.
+
+    The first part is clamped at the hub: P = 20.19 EI / L^2 where a guide ends it, pi^2 EI / (2 L)^2 where nothing but tissue
+    does; parts behind a guide are pinned at both ends, pi^2 EI / L^2.
+    """
+    stiffness, hub = scene.needle.bending_stiffness, depth - scene.needle.length
+    guides = sorted(guide.position for guide in scene.support.guides if guide.stiffness == "rigid" and guide.position > hub)
+    factor, form, end = (CLAMPED_PINNED, "20.19 EI / L^2", "guide") if guides else (pi**2 / 4.0, "pi^2 EI / (2 L)^2", "skin")
+    spans = [(hub, [*guides, 0.0][0], factor, f"{form} of the part from hub to {end}")]
+    spans += [(*pair, pi**2, "pi^2 EI / L^2 of the part behind a guide") for pair in pairwise([*guides, 0.0])]
+    loads = [(part * stiffness / (last - first) ** 2, what, last - first) for first, last, part, what in spans if last > first]
+    load, what, length = min(loads, default=(inf, "", 0.0))
+    return load, f"{what} (L = {length:.4g} m)"
 
 
 def _tip_force(scene: Scene) -> Iterator[str]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fem_needle.checks import notes
 from fem_needle.display import in_newtons, without_rounding
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ EXPLANATION = (
     ("time step", "--time-step chooses, else the tolerance."),
     ("inertia", "parts of the run, how the needle got through each of them, and why."),
     ("left out", "terms of the equation of motion that do not matter here, each with its reason."),
+    ("note", "what may surprise, and the key that changes it."),
     ("run folder", "scene.toml repeats the run; summary.json has this table in SI; series.nc everything over time."),
 )
 
@@ -60,6 +62,8 @@ def computation_rows(run: Trajectory, folder: Path, known_warnings: Sequence[str
     for warning in summary.get("warnings", ()):
         if warning not in known_warnings:
             yield "warning", warning
+    for note in notes(run.scene):
+        yield "note", note
     yield "computed in", f"{summary['solve_time']:.2g} s"
     yield "run folder", str(folder)
     if (folder / "deflection.pvd").exists():

@@ -63,7 +63,7 @@ def check(
 
     Example: fem-needle check thesis --strict
     """
-    from fem_needle.checks import NOT_YOUNGS_MODULUS, suspicious
+    from fem_needle.checks import NOT_YOUNGS_MODULUS, notes, suspicious
     from fem_needle.cli.scene_table import scene_rows
     from fem_needle.scene_file import load_scene
 
@@ -73,7 +73,8 @@ def check(
     for row in scene_rows(loaded):
         table.add_row(*row)
     show(table)
-    typer.echo(f"note: {NOT_YOUNGS_MODULUS}")
+    for note in (NOT_YOUNGS_MODULUS, *notes(loaded)):
+        typer.echo(f"note: {note}")
     messages = [*suspicious(loaded), *model_warnings]
     for message in messages:
         typer.echo(f"warning: {message}", err=True)

@@ -23,7 +23,10 @@ LAYERS = bevel("three-layers", **{"loads.0.bevel_coefficient": 1e-6, "loads.1.fo
 GEL = bevel("misra-2010")
 
 
-@pytest.fixture(scope="module", params=[GEL, LAYERS, GEL.with_value("model.kind", "assumed-modes")], ids=["gel", "layers", "modes"])
+MODES = GEL.with_value("model.kind", "assumed-modes")
+
+
+@pytest.fixture(scope="module", params=[GEL, LAYERS, MODES], ids=["gel", "layers", "modes"])
 def cut(request):
     scene = request.param
     return build_plant(scene), run_scene(scene)

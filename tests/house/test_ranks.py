@@ -33,7 +33,6 @@ RANKS = {
     "scene": 1,
     "elements": 3,
     # what knows a scene and no model
-    "checks": 2,
     "scene_file": 2,
     "segments": 2,
     "time_integrals": 2,
@@ -42,6 +41,7 @@ RANKS = {
     "tissue_block": 2,
     "layer_names": 2,
     "plant": 2,
+    "checks": 3,
     "sample_arrays": 3,
     "models": 3,
     # parts of a model, and what needs only the protocol

@@ -1,11 +1,13 @@
 import pytest
 
 from fem_needle import shipped
-from fem_needle.checks import suspicious, warn_if_suspicious
+from fem_needle.checks import notes, suspicious, warn_if_suspicious
 from fem_needle.errors import SuspiciousValueWarning
-from fem_needle.scene import Controller, Friction, LateralLoad, Layer, Run, Sensor, Support, Tissue
+from fem_needle.scene import Controller, Friction, Guide, Insertion, LateralLoad, Layer, Run, Sensor, Support, Tissue
 from fem_needle.scene_file import load_scene, parse_scene
 from tests.unit.scene.examples import hub_scene
+
+HELD = Support(kind="hub")  # without a guide
 
 
 @pytest.mark.parametrize("name", shipped.shipped_names())
@@ -48,7 +50,7 @@ def test_a_suspicious_value_names_its_inequality(values, inequality, guess):
 
 def test_the_euler_load_of_the_free_part():
     """Pi^2 EI / (2 L)^2 with EI = 0.01572216 and L = 0.18 m: 1.19730 N."""
-    below, above = (hub_scene(friction=Friction(coulomb=push)) for push in (1.197, 1.1975))
+    below, above = (hub_scene(support=HELD, friction=Friction(coulomb=push)) for push in (1.197, 1.1975))
     assert suspicious(below) == ()
     (message,) = suspicious(above)
     assert "1.2 N > 1.2 N, the Euler load" in message
@@ -58,9 +60,40 @@ def test_the_push_adds_friction_and_cutting():
     """0.2 + 20 N/m 0.02 m + (10 + 500 0.02) N s/m 0.01 m/s + 0.4 N = 1.2 N > 1.1973 N."""
     friction = Friction(coulomb=0.2, coulomb_per_length=20.0, viscous=10.0, viscous_per_length=500.0)
     layer = Layer(foundation_modulus=520.0, cutting_force=0.4)
-    assert any("Euler" in line for line in suspicious(hub_scene(friction=friction, tissue=Tissue(layers=[layer]))))
+    way = Insertion(kind="speed", initial_depth=0.02, speed=0.01, final_depth=0.0201)
+    short = {"support": HELD, "friction": friction, "insertion": way}
+    assert any("Euler" in line for line in suspicious(hub_scene(**short, tissue=Tissue(layers=[layer]))))
     lower = Layer(foundation_modulus=520.0, cutting_force=0.39)
-    assert suspicious(hub_scene(friction=friction, tissue=Tissue(layers=[lower]))) == ()
+    assert suspicious(hub_scene(**short, tissue=Tissue(layers=[lower]))) == ()
+
+
+def test_the_free_part_ends_at_a_rigid_guide():
+    """From hub to guide 0.15 m: 20.19 EI / L^2 = 14.11 N with EI = 0.01572216; behind it pi^2 EI / 0.03^2 = 172 N."""
+    guide = Guide(position=-0.03)
+    guided = Support(kind="hub", guides=[guide])
+    below, above = (hub_scene(support=guided, friction=Friction(coulomb=push)) for push in (14.1, 14.2))
+    assert suspicious(below) == ()
+    (message,) = suspicious(above)
+    assert "14.1 N, the Euler load 20.19 EI / L^2 of the part from hub to guide (L = 0.15 m)" in message
+
+
+def test_the_cutting_force_counts_where_the_tip_is_in_its_layer():
+    """A layer at 0.1 m that takes 4 N: there 0.1 m are free, whose Euler load is 3.88 N, and not 1.2 N as at 0.02 m."""
+
+    def of(force):
+        layers = [Layer(foundation_modulus=520.0, end=0.1), Layer(start=0.1, foundation_modulus=520.0, cutting_force=force)]
+        return suspicious(hub_scene(support=HELD, tissue=Tissue(layers=layers)))
+
+    assert of(3.8) == ()
+    (message,) = of(4.0)
+    assert "at 0.1 m, 4 N > 3.88 N" in message
+
+
+def test_a_bevel_on_a_straight_line_has_a_note_and_no_warning():
+    scene = load_scene("three-layers")
+    (note,) = notes(scene)
+    assert "loads.0.bevel_coefficient" in note and "tissue.rest_line = 'cut-path'" in note and suspicious(scene) == ()
+    assert notes(scene.with_value("tissue.rest_line", "cut-path")) == notes(load_scene("thesis")) == ()
 
 
 def test_a_needle_that_is_wholly_inserted_has_no_free_part():
