@@ -66,8 +66,8 @@ def identify(
     options = by_path(model=model, modes=modes, elements=elements, analysis=analysis)
     loaded = changed(load_scene(scene), assignments or (), options)
     given = {
-        "deviations": dict(_deviation(text) for text in sigma or ()),
-        "bounds": dict(_bounds(loaded, text) for text in bounds or ()),
+        "deviations": _once("--sigma", [_deviation(text) for text in sigma or ()]),
+        "bounds": _once("--bounds", [_bounds(loaded, text) for text in bounds or ()]),
         "linear": linear or (),
         "held_back": hold_back,
     }
@@ -128,6 +128,15 @@ def _bounds(scene: Scene, text: str) -> tuple[str, tuple[float, float]]:
         number("--bounds", end, unit_of(scene, path)) if end else free for end, free in zip(ends, (-inf, inf), strict=True)
     )
     return path, (low, high)
+
+
+def _once(option: str, pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    """Return values by name, none of which may be given twice."""
+    names = [name for name, _ in pairs]
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise SceneError(f"{option}: got {', '.join(twice)} more than once; allowed once each")
+    return dict(pairs)
 
 
 def _pair(option: str, text: str, form: str, count: int) -> tuple[str, Sequence[str]]:

@@ -70,16 +70,16 @@ def test_what_is_meant_is_read(reader, name):
 REFUSED = {
     "long row": (PLAIN + "2,40,7\n", "row 4 column 3 has more cells than the header: the row has 3 cells, the header 2"),
     "long row of empty cells": (PLAIN + "2,40,\n", "row 4 column 3 has more cells"),
-    "decimal commas between commas": (f"{HEADER}\n0,0,20,5\n1,0,30,25\n", "row 2 column 3.*decimal commas are read where semicolons"),
+    "decimal commas between commas": (f"{HEADER}\n0,0,20,5\n1,0,30,25\n", "row 2 column 3.*decimal commas are read where"),
     "short row": (PLAIN + "2\n", r"row 4 column 2 \('depth'\) is missing: the row has 1 cell, the header 2"),
     "blank lines count": ("\n" + PLAIN + "\n\n2,soft\n", r"row 7 column 2 \('depth'\) is not a number \(got 'soft'\)"),
     "blank lines count, times": (PLAIN + "\n\n1,40\n", r"times must rise \(row 6 does not: got 1 s after 1 s\)"),
     "header and rows differ": (PLAIN.replace(",", ";", 1), "row 2 column 2.* is missing.*separate rows and header alike.*commas"),
     "rows and header differ": (f"{HEADER}\n0;20\n1;30\n", "row 2 column 2.*separate rows and header alike.*semicolons"),
-    "underscore": (PLAIN + "2,1_000\n", r"row 4 column 2 \('depth'\) is not a number \(got '1_000'\): write digits without underscores"),
+    "underscore": (PLAIN + "2,1_000\n", "row 4 column 2 .* is not a number .got '1_000'.: write digits without underscores"),
     "thousands": (PLAIN + '2,"1,234.5"\n', "row 4 column 2.*without separated thousands"),
     "point and comma": ("time [s];depth [mm]\n0.5;20,5\n1.5;30,2\n", "row 2 column 2.*write all numbers with points"),
-    "comma of either kind": ("time [s];depth [mm]\n0;1,250\n1;2,500\n", "row 2 column 2.*may be a decimal comma or separate thousands"),
+    "comma of either kind": ("time [s];depth [mm]\n0;1,250\n1;2,500\n", "row 2 column 2.*a decimal comma or separate thousands"),
     "empty cell": (PLAIN + "2,\n", "row 4 column 2.* is empty"),
     "not finite": (PLAIN + "2,nan\n", "row 4 column 2.* is not finite .got 'nan'.: allowed up to 1e"),
     "infinite": (PLAIN + "inf,40\n", "row 4 column 1.* is not finite"),
@@ -112,7 +112,7 @@ def test_what_cannot_be_read_is_refused_with_its_place(reader, name):
 def test_cells_that_nobody_reads_may_hold_words():
     table = read_csv("time [s];depth [mm];note\n0,5;20;wet, cold\n1,5;21;dry\n")
     assert table.numbers(0) == [0.5, 1.5]
-    with pytest.raises(ValueError, match="row 2 column 3 .'note'. is not a number"):
+    with pytest.raises(ValueError, match=r"row 2 column 3 .'note'. is not a number"):
         table.numbers(2)
 
 
