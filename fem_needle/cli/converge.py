@@ -55,6 +55,7 @@ def converge(
     Example: fem-needle converge bench-s --degree 3 --values 4,8,16,32 --require-rate 3.9
     """
     from fem_needle.cli.settings import changed
+    from fem_needle.convergence.refinement import refuse_refined
     from fem_needle.run_target import RunTarget
     from fem_needle.scene_file import load_scene
     from fem_needle.study_files import StudyFolder
@@ -66,6 +67,7 @@ def converge(
         "numerics.time_step": time_step,
         "numerics.analysis": analysis,
     }
+    refuse_refined(over, options)
     loaded = changed(load_scene(scene), assignments or (), options)
     target = RunTarget(out or RUNS / f"{Path(scene).stem}-{NAME}", force, numbered=out is None, for_study=True)
     study = _study(loaded, over, values, StudyFolder(NAME, target), quiet=as_json)

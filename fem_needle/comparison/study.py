@@ -24,7 +24,7 @@ from fem_needle.loads import is_steady
 from fem_needle.models import build_plant, model_family
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene
-from fem_needle.scene.settings import overriding
+from fem_needle.scene.settings import overriding, refuse_idle
 from fem_needle.statics import solve_static
 from fem_needle.threads import one_thread
 
@@ -101,6 +101,7 @@ def compare(
         If the reference, or a model at rest, cannot be computed.
     """
     _check(modes, within)
+    refuse_idle(model, {"model.basis": basis, "model.static_corrections": static_corrections})
     given = {"numerics.elements": elements, "numerics.time_step": time_step}
     base = scene.with_values(overriding({path: value for path, value in given.items() if value is not None}))
     values = {"kind": model, "variant": variant, "basis": basis, "static_corrections": static_corrections}
@@ -111,7 +112,7 @@ def compare(
     true_scene, load, error = _reference(base.with_values(plain), not has_statics, within)
     setting = _setting(true_scene, load, has_statics, depths)
     plants = [build_plant(one.with_values(_held(true_scene))) for one in scenes]  # all of them, before anything is computed
-    _refuse_equal(plants)
+    _refuse_equal(plants, modes)
     truth, true_plant = _answer(setting, build_plant(true_scene), None)
     found = (_compared(setting, plant, truth, true_plant, within) for plant in plants)
     compared = tuple(_beside_elements(setting, plant, truth, model) for plant, model in zip(plants, found, strict=True))
@@ -145,9 +146,9 @@ def _check(modes: Sequence[int], within: float) -> None:
         raise SceneError(mistakes)
 
 
-def _refuse_equal(plants: Sequence[Plant]) -> None:
+def _refuse_equal(plants: Sequence[Plant], modes: Sequence[int]) -> None:
     """Refuse numbers of modes that a model does not know."""
-    if len(plants) > 1 and "modes" not in plants[0].describe():
+    if modes and "modes" not in plants[0].describe():
         kind = plants[0].scene.model.kind
         raise SceneError(f"modes: the model {kind!r} does not change with them (got {len(plants)} numbers; allowed none)")
 
