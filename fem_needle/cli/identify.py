@@ -113,8 +113,11 @@ def _measured(name: str) -> Measurements:
 def _deviation(text: str) -> tuple[str, float]:
     """Return column and standard deviation [SI] of an option ``--sigma``."""
     from fem_needle.cli.settings import number
+    from fem_needle.identification.data_columns import FITTED
+    from fem_needle.scene.spelling import known_name
 
     column, [value] = _pair("--sigma", text, "COLUMN=X", 1)
+    column = known_name(column, FITTED)
     return column, number("--sigma", value, "N" if column == "push_force" else "m")
 
 

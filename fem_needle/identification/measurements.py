@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fem_needle.errors import SceneError
 from fem_needle.scene import units
 from fem_needle.scene.csv_table import CsvTable, read_csv
+from fem_needle.scene.spelling import known_name
 from fem_needle.scene.table_file import FEWEST_ROWS, read_text
 from fem_needle.trajectory import VARIABLES
 
@@ -95,6 +96,7 @@ def read_measurements(path: str | Path, needed: Mapping[str, str] | None = None)
     source = Path(path).name
     try:
         table = read_csv(read_text(Path(path)))
+        table = replace(table, names=tuple(known_name(name, KNOWN_UNITS | dict(needed or {})) for name in table.names))
         header = _header(table, source, needed or {})
         found = {
             name: np.array([unit.to_si(x) for x in table.numbers(index)]) for index, (name, unit) in enumerate(header.items())

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import codecs
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from fem_needle.scene import units
 from fem_needle.scene.csv_table import CsvTable, read_csv
+from fem_needle.scene.spelling import known_name
 
 FILE_KEYS = ("file", "column")
 LARGEST_FILE = 50_000_000  # bytes
@@ -41,6 +43,7 @@ def read_table(file: str, column: str, folder: Path | None) -> dict[str, Any]:
 
 def _column(table: CsvTable, column: str) -> dict[str, Any]:
     """Return one column of a table over its times."""
+    table = replace(table, names=tuple(known_name(name, ("time", column)) for name in table.names))
     mistakes = table.header_mistakes() + table.missing({"time": "s", column: None})
     if mistakes:
         raise ValueError("; ".join(mistakes))

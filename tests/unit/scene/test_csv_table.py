@@ -116,6 +116,10 @@ def test_cells_that_nobody_reads_may_hold_words():
         table.numbers(2)
 
 
+def test_names_with_spaces_and_capitals_are_understood(reader):
+    assert reader(PLAIN.replace("time", "Time").replace("depth", "Depth"))[1] == pytest.approx(DEPTHS)
+
+
 def test_a_near_name_is_told(tmp_path):
     (tmp_path / "data.csv").write_text(PLAIN.replace("time [s]", "Time (s)"))
     with pytest.raises(ValueError, match=r"did you mean 'time' by 'Time \(s\)'\? A unit is in square brackets"):
