@@ -29,7 +29,7 @@ def series_csv(run: Trajectory) -> bytes:
 
 def deflection_csv(run: Trajectory) -> bytes:
     """Return `deflection.csv`: a row for each time and a column for each station, whose header is its arc length [m]."""
-    header = ["time [s]", *(f"{station!r} [m]" for station in run.arc_length.tolist())]
+    header = ["time [s]", *(f"{station:.12g} [m]" for station in run.arc_length.tolist())]
     return _csv(header, np.column_stack((run.time, run.station_deflection)))
 
 

@@ -28,7 +28,7 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "tip_angle": ("rad", "slope of the needle at the tip"),
     "hub_angle": ("rad", "angle of the hub"),
     "push_force": ("N", "axial force that the insertion needs, positive going in"),
-    "friction_force": ("N", "axial friction of the shaft, against the motion; 0 at rest"),
+    "friction_force": ("N", "axial force of the shaft on the tissue, with the sign of the speed; at rest what holds a push"),
     "tissue_force": ("N", "total lateral force of the tissue on the needle"),
     "hub_force": ("N", "lateral force of the clamp on the needle"),
     "hub_moment": ("N m", "moment of the clamp on the needle"),

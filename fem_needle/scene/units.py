@@ -43,7 +43,7 @@ _SYMBOLS: dict[str, tuple[float, Dimension]] = {
 _WHOLE = 1e-12  # of a size: how near its inverse is to a whole number that divides exactly
 
 # Units of tables and pictures that are not those with millimeters in place of meters.
-_DISPLAYED = {"Pa": "GPa", "rad": "deg", "N/m^2": "kN/m^2", "N s/m^2": "N s/m^2"}
+_DISPLAYED = {"Pa": "GPa", "rad": "deg", "N/m^2": "kN/m^2", "N s/m^2": "N s/m^2", "kg/m": "g/m", "kg/m^3": "g/cm^3"}
 
 _NAMES: dict[Dimension, str] = {
     (0, 0, 0, 0): "plain number",

@@ -108,7 +108,7 @@ def test_an_ordinary_loop_is_not_suspicious():
 
 @pytest.mark.parametrize(("position", "told"), [("30 mm", True), ("-30 mm", False)])
 def test_a_guide_behind_the_skin_is_asked_back(position, told):
-    values = {"support": {"kind": "hub", "guides": [{"position": position}]}, "insertion.initial_depth": "5 mm", "insertion.final_depth": "100 mm"}
+    values = {"support": {"kind": "hub", "guides": [{"position": position}]}, "insertion.final_depth": "100 mm"}
     if not told:
         load_scene("thesis").with_values(values)
         return
