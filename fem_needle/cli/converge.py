@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fem_needle.cli.scene_commands import SceneArgument
+from fem_needle.cli.run_options import by_path
 from fem_needle.errors import ComputationError, SceneError
 
 if TYPE_CHECKING:
@@ -60,13 +61,7 @@ def converge(
     from fem_needle.scene_file import load_scene
     from fem_needle.study_files import StudyFolder
 
-    options = {
-        "model.kind": model,
-        "numerics.elements": elements,
-        "numerics.degree": degree,
-        "numerics.time_step": time_step,
-        "numerics.analysis": analysis,
-    }
+    options = by_path(model=model, elements=elements, degree=degree, time_step=time_step, analysis=analysis)
     refuse_refined(over, options)
     loaded = changed(load_scene(scene), assignments or (), options)
     target = RunTarget(out or RUNS / f"{Path(scene).stem}-{NAME}", force, numbered=out is None, for_study=True)
