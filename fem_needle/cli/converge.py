@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fem_needle.cli.scene_commands import SceneArgument
 from fem_needle.cli.run_options import by_path
+from fem_needle.cli.scene_commands import SceneArgument
 from fem_needle.errors import ComputationError, SceneError
 
 if TYPE_CHECKING:

@@ -101,10 +101,8 @@ def compare(
         If the reference, or a model at rest, cannot be computed.
     """
     _check(modes, within)
-    given = {"numerics.elements": elements, "numerics.time_step": time_step}
-    base = scene.with_values(overriding({path: value for path, value in given.items() if value is not None}))
-    values = {"kind": model, "variant": variant, "basis": basis, "static_corrections": static_corrections}
-    asked = {f"model.{key}": value for key, value in values.items() if value is not None}
+    base = scene.with_values(overriding(_given("numerics", elements=elements, time_step=time_step)))
+    asked = _given("model", kind=model, variant=variant, basis=basis, static_corrections=static_corrections)
     tested = base.with_values(asked)
     scenes = [tested.with_value("model.modes", count) for count in modes] or [tested]
     plain = {"model.kind": reference, "model.variant": None, "model.kinematics": tested.model.kinematics}
@@ -127,6 +125,11 @@ def compare(
         depths=setting.depths,
         within=within,
     )
+
+
+def _given(part: str, **values: Any) -> dict[str, Any]:
+    """Return the values of a part that are given, by path."""
+    return {f"{part}.{key}": value for key, value in values.items() if value is not None}
 
 
 def _held(scene: Scene) -> dict[str, Any]:
