@@ -92,8 +92,13 @@ def without_rounding(value: float, largest: float) -> float:
 
 
 def in_newtons(force: float) -> str:
-    """Return a push with its unit; less than the hundredth of a millinewton, which nobody measures, is 0 N."""
-    return f"{0.0 if abs(force) < SMALLEST_PUSH else force:.4g} N"
+    """Return a force with its unit; less than the hundredth of a millinewton, which nobody measures, is 0 N."""
+    return f"{measurable(force):.4g} N"
+
+
+def measurable(force: float) -> float:
+    """Return a force [N], 0 where nobody could measure it."""
+    return 0.0 if abs(force) < SMALLEST_PUSH else force
 
 
 def columns_in_millimeters(columns: Mapping[str, Sequence[Any]]) -> dict[str, list[Any]]:

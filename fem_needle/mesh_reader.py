@@ -7,10 +7,14 @@ read it writes the reason and exits with status 1. meshio's readers print, exit,
 from __future__ import annotations
 
 import os
+import re
 import sys
 import xml.etree.ElementTree as Xml
-from io import BytesIO
+from collections import Counter
+from contextlib import redirect_stderr, redirect_stdout
+from io import BytesIO, StringIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import meshio
 import numpy as np
@@ -25,6 +29,15 @@ except ImportError:  # Windows
 LONGEST_REASON = 120
 MOST_MEMORY = 2_000_000_000  # bytes that reading may take: a small compressed file may promise any size
 MOST_POINTS = 2_000_002
+MARK = 1000  # bytes among which Gmsh's first mark is looked for
+TWO_NODES = frozenset(
+    f"{kind}{hybrid}"
+    for kind in ("B21", "B23", "B31", "B33", "B31OS", "PIPE21", "PIPE31", "T2D2", "T3D2", "CONN2D2", "CONN3D2")
+    for hybrid in ("", "H")
+)
+GENERATED = frozenset({"NGEN", "NFILL", "NCOPY", "ELGEN", "ELCOPY", "INCLUDE"})
+TYPE = re.compile(r",\s*TYPE\s*=\s*([^,\s]+)", re.IGNORECASE)
+GMSH_VERSION = re.compile(rb"\$MeshFormat\s+([\d.]+)")
 HDF5 = (".h5m", ".hmf", ".cgns", ".med", ".e", ".exo", ".ex2")
 XDMF = (".xdmf", ".xmf")
 XML = (*XDMF, ".vtu", ".xml", ".svg")
@@ -56,7 +69,7 @@ def contents(path: Path) -> bytes:
         If it leads to other files, or holds too many points; besides what meshio raises.
     """
     check_references(path)
-    mesh = meshio.read(path)
+    mesh = read(path)
     if len(mesh.points) > MOST_POINTS:
         raise ValueError(f"it holds {len(mesh.points)} points (allowed up to {MOST_POINTS})")
     lines = [np.asarray(block.data) for block in mesh.cells if block.type == "line" and len(block.data)]
@@ -68,6 +81,103 @@ def contents(path: Path) -> bytes:
         lines=np.concatenate(lines).astype(np.int64, casting="same_kind") if lines else np.zeros((0, 2), dtype=np.int64),
     )
     return memory.getvalue()
+
+
+def read(path: Path) -> meshio.Mesh:
+    """Return what meshio reads of a file, after mending what it does not know of Abaqus and Gmsh.
+
+    Raises
+    ------
+    ValueError
+        With what meshio printed where it gives up; besides what its readers raise.
+    """
+    ending, printed = path.suffix.lower(), StringIO()
+    try:
+        with redirect_stdout(printed), redirect_stderr(printed):
+            if ending == ".inp":
+                return meshio.read(StringIO(abaqus_text(path.read_text("utf-8-sig", "replace"))), file_format="abaqus")
+            if ending == ".msh" and b"$" in path.read_bytes()[:MARK]:
+                return _read_gmsh(path)
+            return meshio.read(path)
+    except SystemExit:
+        said = printed.getvalue().partition("Error:")[0].split()
+        if not said:
+            raise
+        raise ValueError(" ".join(said)) from None
+
+
+def abaqus_text(text: str) -> str:
+    """Return an Abaqus file with one block of nodes, and all beams and trusses of two nodes under a name that meshio knows.
+
+    Raises
+    ------
+    ValueError
+        If it has elements of another type, or makes nodes and elements from others: names them.
+    """
+    nodes: list[str] = []
+    rest: list[str] = []
+    block = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.startswith("*") and not line.startswith("**"):
+            block = line.partition(",")[0].strip(" *").upper()
+            if block in GENERATED:
+                raise ValueError(f"*{block} in line {number} is not read: write every node and element")
+        is_head = block == "ELEMENT" and line.startswith("*")
+        (nodes if block == "NODE" else rest).append(_known_type(line, number) if is_head else line)
+    data = [line for line in nodes if line.strip() and not line.startswith("*")]
+    names = [line.partition(",")[0].strip() for line in data]
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    if twice is not None:
+        raise ValueError(f"node {twice} is there twice: several parts in one file are not read")
+    return "\n".join(["*NODE", *data, *rest, ""])
+
+
+def _known_type(line: str, number: int) -> str:
+    """Return the line of an element block with a type that meshio knows."""
+    match = TYPE.search(line)
+    written = match[1].upper() if match else ""
+    if match is None:
+        return line
+    if written not in TWO_NODES and written in meshio.abaqus._abaqus.abaqus_to_meshio_type:
+        return line
+    if written not in TWO_NODES:
+        raise ValueError(f"elements of type {written} (line {number}) are not read; allowed {', '.join(sorted(TWO_NODES))}")
+    return f"{line[: match.start(1)]}B31{line[match.end(1) :]}"
+
+
+def _read_gmsh(path: Path) -> meshio.Mesh:
+    """Return what a Gmsh file holds, blank lines and marks of an encoding before its first mark or not."""
+    content = path.read_bytes()
+    mended = gmsh_bytes(content)
+    with TemporaryDirectory() as folder:  # meshio opens this format by its name
+        copy = path if mended == content else Path(folder) / path.name
+        if copy != path:
+            copy.write_bytes(mended)
+        try:
+            return meshio.read(copy, file_format="gmsh")
+        except (ValueError, IndexError, KeyError, TypeError) as error:
+            version = GMSH_VERSION.search(mended)
+            found = "" if version is None else version[1].decode()
+            raise ValueError(f"what follows is not format {found} of Gmsh, as its header says: {error}") from None
+
+
+def gmsh_bytes(content: bytes) -> bytes:
+    """Return a Gmsh file from its first mark on.
+
+    Raises
+    ------
+    ValueError
+        If its format is one that is not read: names it.
+    """
+    start = content[content.index(b"$") :]
+    if start.startswith((b"$NOD", b"$NOE")):
+        raise ValueError("Gmsh's format 1 ($NOD) is not read; save it in format 2.2 or 4.1")
+    match = GMSH_VERSION.search(start)
+    version = match[1].decode() if match else None
+    if version is None or not version.startswith(("2", "4")):
+        found = "no $MeshFormat with a version" if version is None else f"format {version}"
+        raise ValueError(f"{found} of Gmsh is not read; save it in format 2.2 or 4.1")
+    return start
 
 
 def check_references(path: Path) -> None:
@@ -108,6 +218,8 @@ def reason(path: Path, error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return f"it takes more than {MOST_MEMORY / 1e9:g} GB to read"
     said = [] if isinstance(error, SystemExit) else str(error).strip().splitlines()
+    if type(error) is ValueError and said:
+        return said[0][:LONGEST_REASON]
     return f"{type(error).__name__}: {said[0][:LONGEST_REASON]}" if said else "it is truncated, damaged or of another format"
 
 

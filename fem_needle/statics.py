@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle import banded
-from fem_needle.display import MILLIMETERS, Card, Shown
+from fem_needle.display import MILLIMETERS, Card, Shown, in_newtons
 from fem_needle.errors import ComputationError
 from fem_needle.limits import stations_on
 from fem_needle.loads import LoadCase, load_case
@@ -58,10 +58,10 @@ class Equilibrium(Shown):
         facts = (
             ("depth", f"{MILLIMETERS * self.depth:.4g} mm"),
             ("tip", f"{MILLIMETERS * self.tip_deflection:.4g} mm"),
-            ("hub force", f"{self.hub_force:.4g} N"),
+            ("hub force", in_newtons(self.hub_force)),
             ("hub moment", f"{MILLIMETERS * self.hub_moment:.4g} N mm"),
-            ("tissue force", f"{self.tissue_force:.4g} N"),
-            *((f"guide {number}", f"{force:.4g} N") for number, force in enumerate(self.guide_forces)),
+            ("tissue force", in_newtons(self.tissue_force)),
+            *((f"guide {number}", in_newtons(force)) for number, force in enumerate(self.guide_forces)),
             ("time", f"{self.time:.4g} s"),
         )
         return Card("Equilibrium", self.plant.scene.title, facts)

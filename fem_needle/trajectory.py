@@ -30,7 +30,7 @@ VARIABLES: dict[str, tuple[str, str]] = {
     "tip_angle": ("rad", "slope of the needle at the tip"),
     "hub_angle": ("rad", "angle of the hub"),
     "push_force": ("N", "axial force that the insertion needs, positive going in"),
-    "friction_force": ("N", "axial friction of the shaft, against the motion; 0 at rest"),
+    "friction_force": ("N", "axial force of the shaft on the tissue, with the sign of the speed; at rest what holds a push"),
     "cutting_force": ("N", "axial force that cutting takes while the tip advances at its deepest"),
     "axial_force": ("N", "axial force A of the bent needle's tissue and supports, positive going in"),
     "tip_force": ("N", "lateral force of the loads at the tip"),

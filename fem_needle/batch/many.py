@@ -18,6 +18,7 @@ from fem_needle.errors import ComputationError, SceneError, SuspiciousValueWarni
 from fem_needle.models import build_plant
 from fem_needle.progress_bar import ProgressBar
 from fem_needle.scene import Scene
+from fem_needle.scene.spelling import known_name
 from fem_needle.simulation import run_scene, simulate
 from fem_needle.threads import one_thread
 from fem_needle.trajectory import VARIABLES
@@ -128,6 +129,7 @@ def simulate_many(
         if value is not None:
             instead = "threads is its name now" if name == "cores" else "every run has all that its model has"
             warnings.warn(f"{name}: an argument of former versions; {instead}", SuspiciousValueWarning, stacklevel=3)
+    variables = tuple(known_name(name, VARIABLES) for name in variables)
     for name in variables:
         if name not in VARIABLES:
             raise SceneError(f"variables: unknown (got {name!r}; allowed {', '.join(VARIABLES)})")

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 NAME = "benchmark"
 RUNS = Path("runs")
+REPEATS = 5
 RANDOM_SCENES, QUICK_RANDOM_SCENES = 40, 4
 
 Names = Annotated[list[str] | None, typer.Argument(metavar="[CASES]...", help="S, D, M, M2, brachytherapy; by default all.")]
@@ -34,7 +35,7 @@ def benchmark(
     cases: Names = None,
     goals: Annotated[bool, typer.Option("--goals", help="Measure every goal: goal, measured, met.")] = False,
     scaling: Annotated[bool, typer.Option("--scaling", help="Cost over elements, duration, layers, path, tables, runs.")] = False,
-    repeats: Annotated[int, typer.Option(metavar="N", help="Rounds in which the methods take turns.")] = 5,
+    repeats: Annotated[int | None, typer.Option(metavar="N", help="Rounds in which methods take turns; by default 5.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="One round of the two coarsest settings of each method.")] = False,
     rivals: Scripts = None,
     out: Folder = None,
@@ -51,13 +52,14 @@ def benchmark(
     from fem_needle.run_target import RunTarget
     from fem_needle.study_files import StudyFolder
 
-    if repeats < 1:
-        raise SceneError(f"--repeats: too few (got {repeats}; allowed 1 or more)")
+    if repeats is not None and (quick or repeats < 1):
+        why = "has no effect with --quick, one round" if quick else "too few"
+        raise SceneError(f"--repeats: {why} (got {repeats}; allowed 1 or more without --quick)")
     chosen = cases_of(cases or ())
     others = Rivals() if rivals is None else load_rivals(rivals)
     folder = StudyFolder(NAME, RunTarget(out or RUNS / NAME, force, numbered=out is None, for_study=True))
     folder.check()
-    rounds = 1 if quick else repeats
+    rounds = 1 if quick else repeats or REPEATS
     study = _measure(chosen, others, rounds, quick=quick, goals=goals, scaling=scaling, quiet=as_json)
     _write(study, chosen, folder, record, quiet=as_json)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fem_needle.cli.run_options import by_path
 from fem_needle.cli.scene_commands import SceneArgument
 from fem_needle.errors import ComputationError, SceneError
 
@@ -55,17 +56,13 @@ def converge(
     Example: fem-needle converge bench-s --degree 3 --values 4,8,16,32 --require-rate 3.9
     """
     from fem_needle.cli.settings import changed
+    from fem_needle.convergence.refinement import refuse_refined
     from fem_needle.run_target import RunTarget
     from fem_needle.scene_file import load_scene
     from fem_needle.study_files import StudyFolder
 
-    options = {
-        "model.kind": model,
-        "numerics.elements": elements,
-        "numerics.degree": degree,
-        "numerics.time_step": time_step,
-        "numerics.analysis": analysis,
-    }
+    options = by_path(model=model, elements=elements, degree=degree, time_step=time_step, analysis=analysis)
+    refuse_refined(over, options)
     loaded = changed(load_scene(scene), assignments or (), options)
     target = RunTarget(out or RUNS / f"{Path(scene).stem}-{NAME}", force, numbered=out is None, for_study=True)
     study = _study(loaded, over, values, StudyFolder(NAME, target), quiet=as_json)

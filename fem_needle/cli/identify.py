@@ -66,8 +66,8 @@ def identify(
     options = by_path(model=model, modes=modes, elements=elements, analysis=analysis)
     loaded = changed(load_scene(scene), assignments or (), options)
     given = {
-        "deviations": dict(_deviation(text) for text in sigma or ()),
-        "bounds": dict(_bounds(loaded, text) for text in bounds or ()),
+        "deviations": _once("--sigma", [_deviation(text) for text in sigma or ()]),
+        "bounds": _once("--bounds", [_bounds(loaded, text) for text in bounds or ()]),
         "linear": linear or (),
         "held_back": hold_back,
     }
@@ -113,8 +113,11 @@ def _measured(name: str) -> Measurements:
 def _deviation(text: str) -> tuple[str, float]:
     """Return column and standard deviation [SI] of an option ``--sigma``."""
     from fem_needle.cli.settings import number
+    from fem_needle.identification.data_columns import FITTED
+    from fem_needle.scene.spelling import known_name
 
     column, [value] = _pair("--sigma", text, "COLUMN=X", 1)
+    column = known_name(column, FITTED)
     return column, number("--sigma", value, "N" if column == "push_force" else "m")
 
 
@@ -128,6 +131,15 @@ def _bounds(scene: Scene, text: str) -> tuple[str, tuple[float, float]]:
         number("--bounds", end, unit_of(scene, path)) if end else free for end, free in zip(ends, (-inf, inf), strict=True)
     )
     return path, (low, high)
+
+
+def _once(option: str, pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    """Return values by name, none of which may be given twice."""
+    names = [name for name, _ in pairs]
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise SceneError(f"{option}: got {', '.join(twice)} more than once; allowed once each")
+    return dict(pairs)
 
 
 def _pair(option: str, text: str, form: str, count: int) -> tuple[str, Sequence[str]]:

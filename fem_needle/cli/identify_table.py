@@ -45,6 +45,7 @@ def show_identification(found: Identification, folder: Path) -> None:
 
 def _lines(found: Identification) -> list[str]:
     lines = [f"rows: {len(found.measured)} fitted, the model was computed {found.evaluations} times"]
+    lines += [f"note: {note}" for note in found.notes]
     lines.append(f"noise: {_noise(found)}")
     pairs = combinations(range(len(found.parameters)), 2)
     paths = [one.path for one in found.parameters]

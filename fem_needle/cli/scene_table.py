@@ -33,8 +33,7 @@ def scene_rows(scene: Scene) -> Iterator[Row]:
 
 
 def _converted(value: Any, unit: str) -> str:
-    shown = display_unit(unit)
-    return "" if shown == unit or isinstance(value, str | tuple) else _written(value, shown, unit)
+    return _written(value, display_unit(unit), unit)
 
 
 def _written(value: Any, unit: str, stored_unit: str | None = None) -> str:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fem_needle.view import Arrangement
 
 PICTURE = "view.png"
+AUTO = "auto"
 
 
 def register(application: typer.Typer) -> None:
@@ -29,7 +30,7 @@ def view(
     picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a picture, PNG, and open no window.")] = None,
     time: Annotated[str | None, typer.Option(metavar="TIME", help="Sample to show; by default the last.")] = None,
     magnification: Annotated[float | None, typer.Option(metavar="X", help="Of deflections; by default a round number.")] = None,
-    renderer: Annotated[str, typer.Option(metavar="NAME", help="Of the picture: auto, vtk or matplotlib.")] = "auto",
+    renderer: Annotated[str, typer.Option(metavar="NAME", help="Of the picture: auto, vtk or matplotlib.")] = AUTO,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier file.")] = False,
 ) -> None:
     """Show a run in three dimensions: a window, a picture, or a page for any browser.
@@ -48,6 +49,8 @@ def view(
         typer.echo("note: no display, so a picture in place of a window", err=True)
     if picture is not None and picture.suffix.lower() != ".png":
         raise SceneError(f"--picture: is no PNG file by its name (got {picture.name!r}; allowed a name that ends in .png)")
+    if picture is None and renderer != AUTO:
+        raise SceneError(f"--renderer: has no effect without --picture (got {renderer!r})")
     for path in (html, picture):
         if path is not None and path.exists() and not force:
             raise SceneError(f"{path}: exists already (use --force to replace it)")
@@ -82,5 +85,5 @@ def _write_picture(arranged: Arrangement, row: int, path: Path, renderer: str) -
         raise SceneError(f"--renderer: is not a choice (got {renderer!r}; allowed {', '.join(names)})")
     drawer = write_picture(arranged, row, path, Renderer(renderer))
     typer.echo(f"wrote {path}: {arranged.note}")
-    if drawer is Renderer.MATPLOTLIB and renderer == Renderer.AUTO.value:
+    if drawer is Renderer.MATPLOTLIB and renderer == AUTO:
         typer.echo("note: VTK found no GL here, so matplotlib drew it", err=True)

@@ -5,7 +5,7 @@ The reference and the models get the same scene, kinematics, analysis, time step
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,7 +24,7 @@ from fem_needle.loads import is_steady
 from fem_needle.models import build_plant, model_family
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene
-from fem_needle.scene.settings import overriding
+from fem_needle.scene.settings import overriding, refuse_idle
 from fem_needle.statics import solve_static
 from fem_needle.threads import one_thread
 
@@ -101,17 +101,16 @@ def compare(
         If the reference, or a model at rest, cannot be computed.
     """
     _check(modes, within)
-    given = {"numerics.elements": elements, "numerics.time_step": time_step}
-    base = scene.with_values(overriding({path: value for path, value in given.items() if value is not None}))
-    values = {"kind": model, "variant": variant, "basis": basis, "static_corrections": static_corrections}
-    tested = base.with_values({f"model.{key}": value for key, value in values.items() if value is not None})
+    base = scene.with_values(overriding(_given("numerics", elements=elements, time_step=time_step)))
+    asked = _given("model", kind=model, variant=variant, basis=basis, static_corrections=static_corrections)
+    tested = base.with_values(asked)
     scenes = [tested.with_value("model.modes", count) for count in modes] or [tested]
     plain = {"model.kind": reference, "model.variant": None, "model.kinematics": tested.model.kinematics}
     has_statics = tested.model.variant != WITHOUT_STATICS
     true_scene, load, error = _reference(base.with_values(plain), not has_statics, within)
     setting = _setting(true_scene, load, has_statics, depths)
     plants = [build_plant(one.with_values(_held(true_scene))) for one in scenes]  # all of them, before anything is computed
-    _refuse_equal(plants)
+    _refuse_equal(plants, modes, asked)
     truth, true_plant = _answer(setting, build_plant(true_scene), None)
     found = (_compared(setting, plant, truth, true_plant, within) for plant in plants)
     compared = tuple(_beside_elements(setting, plant, truth, model) for plant, model in zip(plants, found, strict=True))
@@ -126,6 +125,11 @@ def compare(
         depths=setting.depths,
         within=within,
     )
+
+
+def _given(part: str, **values: Any) -> dict[str, Any]:
+    """Return the values of a part that are given, by path."""
+    return {f"{part}.{key}": value for key, value in values.items() if value is not None}
 
 
 def _held(scene: Scene) -> dict[str, Any]:
@@ -145,9 +149,10 @@ def _check(modes: Sequence[int], within: float) -> None:
         raise SceneError(mistakes)
 
 
-def _refuse_equal(plants: Sequence[Plant]) -> None:
-    """Refuse numbers of modes that a model does not know."""
-    if len(plants) > 1 and "modes" not in plants[0].describe():
+def _refuse_equal(plants: Sequence[Plant], modes: Sequence[int], asked: Mapping[str, Any]) -> None:
+    """Refuse numbers of modes, and settings by path, that a model does not know."""
+    refuse_idle(plants[0].scene.model.kind, asked)
+    if modes and "modes" not in plants[0].describe():
         kind = plants[0].scene.model.kind
         raise SceneError(f"modes: the model {kind!r} does not change with them (got {len(plants)} numbers; allowed none)")
 

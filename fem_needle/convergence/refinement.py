@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -33,6 +33,19 @@ PATHS = {"elements": "numerics.elements", "time-step": "numerics.time_step", "mo
 STATIC_INSTANTS = 21  # equilibria over a run that moves
 FIXED_STEP_SHARE = 0.125  # of the automatic first step: the step that is held fixed
 ROUND_OFF_INSTANTS = 7
+
+
+def refuse_refined(over: str, given: Mapping[str, object]) -> None:
+    """Refuse a value, by path, for what a study refines and does not hold fixed.
+
+    Raises
+    ------
+    SceneError
+        With the path.
+    """
+    path = PATHS.get(over, "")
+    if given.get(path) is not None:
+        raise SceneError(f"{path}: has no effect where it is refined (got {given[path]!r}; give the values of the study instead)")
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from fem_needle.convergence.refinement import (
     coarsest_time_step,
     finer_otherwise,
     levels_of,
+    refuse_refined,
     setting_of,
     size_of,
 )
@@ -169,6 +170,7 @@ def converge(
         "numerics.time_step": time_step,
         "numerics.analysis": analysis,
     }
+    refuse_refined(over, given)
     scene = scene.with_values(overriding({path: value for path, value in given.items() if value is not None}))
     wanted = None if values is None else _checked(over, values)
     setting = setting_of(scene, over, wanted or DEFAULT_VALUES.get(over))

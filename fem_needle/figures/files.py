@@ -68,6 +68,8 @@ def write_pictures(
     """
     _check_choices("kind", kinds, KINDS)
     _check_choices("format", formats, FORMATS)
+    if depths is not None and "shapes" not in kinds:
+        raise SceneError(f"depth: has no effect without shapes (got {', '.join(kinds)}; add the kind 'shapes')")
     names = {f"{PICTURES[kind]}.{ending}": (kind, ending) for kind in kinds for ending in formats}
     targets = [folder / name for name in (*names, *([ANIMATION] if animate else []))]
     for target in targets:

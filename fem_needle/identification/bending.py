@@ -66,7 +66,7 @@ def section_moment(section: str, outer: float, inner: float = 0.0) -> float:
     outer
         Side or diameter [m].
     inner
-        Bore of a tube [m].
+        Bore of a tube, and of a tube alone [m].
 
     Raises
     ------
@@ -75,9 +75,9 @@ def section_moment(section: str, outer: float, inner: float = 0.0) -> float:
     """
     if section not in SECTIONS:
         raise SceneError(f"section: unknown (got {section!r}; allowed {', '.join(SECTIONS)})")
-    if not outer > 0.0 or not 0.0 <= inner < outer or (section != "tube" and inner):
+    if not outer > 0.0 or not 0.0 <= inner < outer or (section == "tube") != (inner > 0.0):
         found = f"got {outer:g} and {inner:g} m"
-        raise SceneError(f"section: impossible diameters ({found}; allowed above 0 and, of a tube, a smaller bore)")
+        raise SceneError(f"section: impossible diameters ({found}; allowed above 0 and, of a tube alone, a smaller bore above 0)")
     return outer**4 / 12.0 if section == "square" else pi * (outer**4 - inner**4) / 64.0
 
 

@@ -8,7 +8,7 @@ correlations; intervals are Student's t in the scale of the fit (Draper and Smit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import exp, inf, log
 
 import numpy as np
@@ -16,9 +16,10 @@ import scipy  # its parts are loaded where they are used
 from numpy.typing import NDArray
 
 from fem_needle.errors import SceneError
+from fem_needle.identification.data_columns import data_notes, refuse_misspelled
 from fem_needle.identification.least_squares import CONFIDENCE, LinearFit, weighted_least_squares
 from fem_needle.identification.measurements import Measurements
-from fem_needle.identification.predictions import Predictor, predictor_of
+from fem_needle.identification.predictions import AtRest, Predictor, predictor_of
 from fem_needle.identification.result import Identification, Parameter, Prediction, Whiteness
 from fem_needle.identification.static_model import value_at
 from fem_needle.scene import Scene
@@ -77,15 +78,19 @@ def identify(
     scene = scene if model is None else scene.with_value("model.kind", model)
     sets = [measured] if isinstance(measured, Measurements) else list(measured)
     scales = _Scales.of(scene, parameters, bounds or {}, linear)
+    refuse_misspelled(sets)
     fitted, kept = zip(*(_split(one, held_back) for one in sets), strict=True)
     predictor = predictor_of(scene, fitted, parameters, deviations or {})
-    return _fitted(scene, predictor, scales, _held(scene, kept, parameters, deviations or {}))
+    found = _fitted(scene, predictor, scales, _held(scene, kept, parameters, deviations or {}))
+    return replace(found, notes=data_notes(scene, sets, at_rest=isinstance(predictor, AtRest)))
 
 
 def _split(data: Measurements, share: float) -> tuple[Measurements, Measurements]:
     if not 0.0 <= share < 1.0:
         raise SceneError(f"held_back: out of range (got {share:g}; allowed 0 to below 1)")
     first = data.size - round(share * data.size)
+    if share > 0.0 and first == data.size:
+        raise SceneError(f"held_back: holds back no row of {data.source} (got {share:g} of {data.size}; 0 to fit all rows)")
     return data.rows(slice(0, first)), data.rows(slice(first, None))
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +11,14 @@ from numpy.typing import NDArray
 
 from fem_needle.errors import SceneError
 from fem_needle.scene import units
-from fem_needle.scene.table_file import column_numbers, csv_rows, read_text, split_header
+from fem_needle.scene.csv_table import CsvTable, read_csv
+from fem_needle.scene.spelling import known_name
+from fem_needle.scene.table_file import FEWEST_ROWS, read_text
 from fem_needle.trajectory import VARIABLES
 
 Array = NDArray[np.float64]
 
-LARGEST_NUMBER = 1e30  # SI: squares of it must not overflow
 MOST_COLUMNS = 1000
-FEWEST_ROWS = 2
 LONGEST_LINE, MOST_MISTAKES = 300, 50  # of a message
 SPACING_TOLERANCE = 0.05  # of the mean interval: times written with few digits count as equally spaced, 30 Hz in whole ms
 
@@ -79,7 +78,7 @@ def read_measurements(path: str | Path, needed: Mapping[str, str] | None = None)
     Parameters
     ----------
     path
-        The file: UTF-8, at most 50 MB; the first row names the columns, each with its unit in brackets (``[1]``: a plain number).
+        The file, at most 50 MB; its header names the columns, each with its unit in brackets (``[1]``: a plain number).
     needed
         SI units by name of columns that must be there.
 
@@ -96,15 +95,18 @@ def read_measurements(path: str | Path, needed: Mapping[str, str] | None = None)
     """
     source = Path(path).name
     try:
-        rows = csv_rows(read_text(Path(path)))
-        header = _header(rows, source, needed or {})
-        columns = {name: _column(rows, number, name, source) for number, name in enumerate(header)}
-    except (ValueError, csv.Error) as error:
+        table = read_csv(read_text(Path(path)))
+        table = replace(table, names=tuple(known_name(name, KNOWN_UNITS | dict(needed or {})) for name in table.names))
+        header = _header(table, source, needed or {})
+        found = {
+            name: np.array([unit.to_si(x) for x in table.numbers(index)]) for index, (name, unit) in enumerate(header.items())
+        }
+        if "time" in found:
+            table.rising(found["time"].tolist())
+    except ValueError as error:
         mistakes = error.mistakes if isinstance(error, SceneError) else (f"{source}: {error}",)
         raise SceneError([line[:LONGEST_LINE] for line in mistakes[:MOST_MISTAKES]]) from None
-    found = Measurements({name: np.array([unit.to_si(x) for x in columns[name]]) for name, unit in header.items()}, source)
-    _check_times(found)
-    return found
+    return Measurements(found, source)
 
 
 def sampling_interval(time: Array) -> float:
@@ -128,29 +130,24 @@ def sampling_interval(time: Array) -> float:
     return interval
 
 
-def _header(rows: list[list[str]], source: str, needed: Mapping[str, str]) -> dict[str, units.Unit]:
-    if len(rows) <= FEWEST_ROWS:
-        raise SceneError(f"{source}: needs a header and at least {FEWEST_ROWS} rows (got {max(len(rows) - 1, 0)})")
-    if len(rows[0]) > MOST_COLUMNS:
-        raise SceneError(f"{source}: has {len(rows[0])} columns (allowed at most {MOST_COLUMNS})")
-    cells = [split_header(cell) for cell in rows[0]]
-    names = [name for name, _ in cells]
-    mistakes = [f"{source}: column {name!r} comes twice" for name in dict.fromkeys(names) if names.count(name) > 1]
-    mistakes += [f"{source}: needs a column {name!r} [{unit}]" for name, unit in needed.items() if name not in names]
+def _header(table: CsvTable, source: str, needed: Mapping[str, str]) -> dict[str, units.Unit]:
+    if len(table.rows) < FEWEST_ROWS:
+        raise SceneError(f"{source}: needs a header and at least {FEWEST_ROWS} rows (got {len(table.rows)})")
+    if len(table.names) > MOST_COLUMNS:
+        raise SceneError(f"{source}: has {len(table.names)} columns (allowed at most {MOST_COLUMNS})")
+    mistakes = table.header_mistakes() + table.missing(needed)
     found = {}
-    for name, written in cells:
+    for name, written in zip(table.names, table.units, strict=True):
         try:
             found[name] = _unit(name, written, (KNOWN_UNITS | dict(needed)).get(name))
         except ValueError as error:
-            mistakes.append(f"{source}: column {name!r} {error}")
+            mistakes.append(f"column {name!r} {error}")
     if mistakes:
-        raise SceneError(mistakes)
+        raise SceneError([f"{source}: {line}" for line in mistakes])
     return found
 
 
 def _unit(name: str, written: str | None, expected: str | None) -> units.Unit:
-    if not name:
-        raise ValueError("has no name")
     if not written:
         raise ValueError(f"needs its unit in brackets, as in '{name} [{expected or 'mm'}]'; [1] for a plain number")
     unit = units.parse_unit(written)
@@ -160,20 +157,3 @@ def _unit(name: str, written: str | None, expected: str | None) -> units.Unit:
     if unit.dimension != wanted.dimension:
         raise ValueError(f"is in {written!r} (allowed {units.dimension_name(wanted.dimension)}, such as {expected})")
     return unit
-
-
-def _column(rows: list[list[str]], index: int, name: str, source: str) -> list[float]:
-    numbers = column_numbers(rows, index, source)
-    wrong = [line for line, number in enumerate(numbers, start=2) if not abs(number) <= LARGEST_NUMBER]
-    if wrong:
-        raise SceneError(f"{source}: row {wrong[0]}, column {name!r} is not finite (allowed up to {LARGEST_NUMBER:g})")
-    longer = next((line for line, row in enumerate(rows, start=1) if len(row) > len(rows[0])), None)
-    if longer is not None:
-        raise SceneError(f"{source}: row {longer} has more cells than the header")
-    return numbers
-
-
-def _check_times(found: Measurements) -> None:
-    if "time" in found and not np.all(np.diff(found["time"]) > 0.0):
-        row = int(np.argmin(np.diff(found["time"]) > 0.0)) + 3
-        raise SceneError(f"{found.source}: times must rise (row {row} does not)")

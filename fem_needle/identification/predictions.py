@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fem_needle.dynamics.vibration import needs_no_steps
 from fem_needle.errors import SceneError
+from fem_needle.identification.data_columns import SHAPE, check_time, fitted_columns
 from fem_needle.identification.measurements import Measurements
 from fem_needle.identification.static_model import Place, StaticProblem, static_problem
 from fem_needle.motion import run_duration
@@ -21,8 +22,6 @@ from fem_needle.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-SHAPE = "deflection_at_"  # and an arc length in mm
-FITTED = ("tip_deflection", "push_force")
 SAMPLES_BETWEEN, MOST_BETWEEN, MOST_SAMPLES = 4, 40, 20_000  # of a run: fewest and most in a measured interval; in all
 HIT = 1e-6  # of a sample's interval: a measured time that is a sample's
 STEP = 1e-4  # of a parameter: of the differences of a run
@@ -112,7 +111,7 @@ class InMotion:
 
     def _answers(self, values: Array) -> Array:
         run = run_scene(self.scene.with_values(dict(zip(self.paths, values.tolist(), strict=True))))
-        return np.concatenate([_column(run, one, name) for one in self.sets for name in _fitted_columns(one)])
+        return np.concatenate([_column(run, one, name) for one in self.sets for name in fitted_columns(one)])
 
 
 def _replaced(values: Array, number: int, value: float) -> Array:
@@ -131,10 +130,10 @@ def predictor_of(
     SceneError
         If a data set has no column that could be fitted, or neither depth nor time.
     """
-    names = [name for one in sets for name in _fitted_columns(one)]
-    measured = np.concatenate([one[name] for one in sets for name in _fitted_columns(one)])
+    names = [name for one in sets for name in fitted_columns(one)]
+    measured = np.concatenate([one[name] for one in sets for name in fitted_columns(one)])
     known = _deviations(sets, names, deviations)
-    rows = tuple(row for one in sets for name in _fitted_columns(one) for row in _rows(one, name))
+    rows = tuple(row for one in sets for name in fitted_columns(one) for row in _rows(one, name))
     at_rest = all("depth" in one for one in sets) and "push_force" not in names and _rests(scene)
     if at_rest:
         places, order = _places(scene, sets)
@@ -152,14 +151,6 @@ def _rests(scene: Scene) -> bool:
     return scene.tissue.rest_line == "straight" and (
         scene.numerics.analysis == "static" or (scene.numerics.analysis == "quasi-static" and still)
     )
-
-
-def _fitted_columns(data: Measurements) -> list[str]:
-    found = [name for name in data.names if name in FITTED or name.startswith(SHAPE)]
-    if not found:
-        allowed = f"{', '.join(FITTED)}, {SHAPE}<mm>"
-        raise SceneError(f"{data.source}: has no column that could be fitted (got {', '.join(data.names)}; allowed {allowed})")
-    return found
 
 
 def _rows(data: Measurements, name: str) -> list[MeasuredRow]:
@@ -185,7 +176,8 @@ def _places(scene: Scene, sets: Sequence[Measurements]) -> tuple[list[Place], ND
     """Return a place for each row of each set, and the order in which their deflections come among the columns."""
     places, order, offset, length = [], [], 0, scene.needle.length
     for one in sets:
-        columns = _fitted_columns(one)
+        check_time(scene, one)
+        columns = fitted_columns(one)
         stations = np.array([_station(name, length) for name in columns])
         times = one["time"] if "time" in one else np.zeros(one.size)
         for row, (depth, time) in enumerate(zip(one["depth"], times, strict=True)):
@@ -199,14 +191,16 @@ def _places(scene: Scene, sets: Sequence[Measurements]) -> tuple[list[Place], ND
 
 def _deviations(sets: Sequence[Measurements], names: Sequence[str], given: Mapping[str, float]) -> Array:
     kinds = {"deflection" if name != "push_force" else name for name in names}
-    missing = sorted(set(names) - set(given))
+    missing, idle = sorted(set(names) - set(given)), sorted(set(given) - set(names))
+    if idle:
+        raise SceneError(f"deviations: {', '.join(idle)}: no column that is fitted (allowed {', '.join(dict.fromkeys(names))})")
     if given and missing:
         raise SceneError(f"deviations: of every column or of none (missing {', '.join(missing)})")
     if not given and len(kinds) > 1:
         raise SceneError("deviations: must be given where forces and deflections are fitted together")
     if any(not value > 0.0 for value in given.values()):
         raise SceneError(f"deviations: must be positive (got {dict(given)})")
-    return np.concatenate([np.full(one.size, given.get(name, 1.0)) for one in sets for name in _fitted_columns(one)])
+    return np.concatenate([np.full(one.size, given.get(name, 1.0)) for one in sets for name in fitted_columns(one)])
 
 
 def _sampled(scene: Scene, sets: Sequence[Measurements]) -> Scene:

@@ -108,6 +108,8 @@ class Identification(Shown):
         How often the model was asked.
     rows
         Where each row comes from.
+    notes
+        Sentences on what the data hold and the fit does not use.
     """
 
     scene: Scene
@@ -121,6 +123,7 @@ class Identification(Shown):
     prediction: Prediction | None
     evaluations: int
     rows: tuple[MeasuredRow, ...]
+    notes: tuple[str, ...] = ()
 
     def _card(self) -> Card:
         facts = (
@@ -183,6 +186,7 @@ def plain(found: Identification) -> dict[str, Any]:
         "whiteness": vars(found.whiteness),
         "prediction": None if prediction is None else vars(prediction),
         "evaluations": found.evaluations,
+        "notes": list(found.notes),
     }
 
 

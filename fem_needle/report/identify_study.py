@@ -28,6 +28,7 @@ def identify_parts(data: dict[str, Any], columns: Columns, scene: Scene) -> Stud
         ("Residuals", _whiteness(data["whiteness"])),
         ("Condition", f"{number(data['condition'])}: the worst seen combination of relative changes against the best."),
         ("Prediction", _prediction(data.get("prediction"))),
+        *(("Data", f"{note}.") for note in data.get("notes", ())),
     ]
     likely = data["whiteness"].get("p_value")
     warnings = ("The residuals are not random: the model misses something, and the intervals are too narrow.",)

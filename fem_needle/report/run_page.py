@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fem_needle.closed_loop.units import shown_unit
-from fem_needle.display import without_rounding
+from fem_needle.display import measurable, without_rounding
 from fem_needle.figures import tip_path, waterfall
 from fem_needle.figures.common import suited
 from fem_needle.figures.energy_figure import LEDGER, RESIDUALS, largest_energy, ledger_terms
@@ -106,8 +106,8 @@ def _summary_rows(run: Trajectory) -> Iterator[tuple[str, str]]:
     yield "depth at the end", millimeters(float(run.depth[-1]))
     yield "tip deflection at the end", millimeters(float(run.tip_deflection[-1]))
     yield "largest tip deflection", millimeters(largest)
-    yield "push force at the end", quantity(float(run.push_force[-1]), "N")
-    yield "largest push force", quantity(push, "N")
+    yield "push force at the end", quantity(measurable(float(run.push_force[-1])), "N")
+    yield "largest push force", quantity(measurable(push), "N")
     if "target_error" in summary:
         yield from _target_rows(summary)
     estimate, residual = summary.get("error_estimate"), summary.get("relative_energy_residual")

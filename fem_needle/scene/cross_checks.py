@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from fem_needle.display import in_millimeters
 from fem_needle.mesh_file import length_mistake
 from fem_needle.scene.loads import LateralLoad, TipLoad
 from fem_needle.scene.part import Mistake
@@ -85,14 +86,18 @@ def _place_mistakes(scene: Scene) -> Iterator[Mistake]:
             if layer.holds(y) and y != 0.0:
                 beyond = "" if layer.end is None else f" or from {layer.end:g} m"
                 outside = f"got {y:g}; allowed at most {layer.start:g} m{beyond}"
-                yield Mistake(path, f"the {name} lies inside the tissue ({outside})", y)
+                yield Mistake(path, f"the {name} lies inside the tissue ({outside}){_before_the_skin(y)}", y)
         if highest - length >= y - ROUNDING * length:
             limits = f"got {y:g}; allowed above {highest - length:.9g} m, where the hub gets"
             message = f"the hub meets the {name} at the depth {y + length:.9g} m ({limits})"
             yield Mistake(path, message, y)
         if y > 0.0 and y > lowest:
             limits = f"got {y:g}; allowed at most {lowest:.9g} m, the smallest depth of the run"
-            yield Mistake(path, f"the {name} is not always on the needle ({limits})", y)
+            yield Mistake(path, f"the {name} is not always on the needle ({limits}){_before_the_skin(y)}", y)
+
+
+def _before_the_skin(y: float) -> str:
+    return f"; negative is before the skin: did you mean {in_millimeters(-y)}?" if y > 0.0 else ""
 
 
 def _kinematics_mistakes(scene: Scene) -> Iterator[Mistake]:

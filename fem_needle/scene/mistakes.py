@@ -120,3 +120,4 @@ def _bare(annotation: Any) -> Any:
     return annotation.__origin__ if hasattr(annotation, "__metadata__") else annotation
 
 
+Part.mistake_lines = staticmethod(mistake_lines)

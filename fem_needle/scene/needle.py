@@ -8,6 +8,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from fem_needle.scene.gauges import OuterDiameter
 from fem_needle.scene.part import Mistake, Part, raise_mistakes
 from fem_needle.scene.quantity import Quantity
 
@@ -37,7 +38,7 @@ class Needle(Part):
     area
         A of the cross section [m^2].
     outer_diameter, inner_diameter
-        D and d [m]; in place of I and A; d is 0 where it is not given.
+        D and d [m]; in place of I and A; D may be a gauge, "18 G"; d is 0 where it is not given.
     density
         rho [kg/m^3].
     bending_stiffness
@@ -50,7 +51,7 @@ class Needle(Part):
     youngs_modulus: Annotated[float | None, _optional("Pa")] = None
     second_moment_of_area: Annotated[float | None, _optional("m^4")] = None
     area: Annotated[float | None, _optional("m^2")] = None
-    outer_diameter: Annotated[float | None, _optional("m")] = None
+    outer_diameter: Annotated[float | None, OuterDiameter(above=0.0, optional=True)] = None
     inner_diameter: Annotated[float | None, Quantity("m", at_least=0.0, optional=True)] = None
     density: Annotated[float | None, _optional("kg/m^3")] = None
     # Replaced by E I and rho A in _derive where they are not given.

@@ -2,20 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any, ClassVar, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from fem_needle.errors import SceneError
 
 MISTAKE = "mistake"
 MOST_ENTRIES = 1000  # of a list of parts: they are compared with each other
 
 
 class Part(BaseModel):
-    """A frozen piece of a scene; unknown keys are errors."""
+    """A frozen piece of a scene; unknown keys are errors.
+
+    Raises
+    ------
+    SceneError
+        Built with keywords that are impossible: every mistake, as of a scene file.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
+    # Set by `fem_needle.scene.mistakes`, which knows all parts.
+    mistake_lines: ClassVar[Callable[[ValidationError, type[Part]], tuple[str, ...]]]
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise SceneError(Part.mistake_lines(error, type(self))) from None
+
+    # Parts inside a whole are validated with it, and not through this.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     def own_units(self) -> dict[str, str | None]:
         """Return dotted keys whose unit depends on another key, with that unit; None: the key has no meaning here."""

@@ -122,17 +122,32 @@ class Quantity:
     @property
     def range_text(self) -> str:
         """The allowed values in words, with the unit."""
-        if self.at_least is not None and self.at_most is not None:
-            text = f"{self.at_least:g} to {self.at_most:g}"
+        return self.range_in(self.unit)
+
+    def range_in(self, unit: str) -> str:
+        """Return the allowed values in words, in a unit of the same dimension."""
+        size = units.parse_unit(unit).size / units.parse_unit(self.unit).size
+        at_least, above, at_most, below = (
+            None if bound is None else bound / size for bound in (self.at_least, self.above, self.at_most, self.below)
+        )
+        if at_least is not None and at_most is not None:
+            text = f"{at_least:g} to {at_most:g}"
         else:
-            words = ("at least", "above", "at most", "below")
-            limits = zip(words, (self.at_least, self.above, self.at_most, self.below), strict=True)
-            bounds = [f"{word} {bound:g}" for word, bound in limits if bound is not None]
+            limits = {"at least": at_least, "above": above, "at most": at_most, "below": below}
+            bounds = [f"{word} {bound:g}" for word, bound in limits.items() if bound is not None]
             text = " and ".join(bounds) or "any finite number"
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        return text + unit + "".join(f" or '{word}'" for word in self.words)
+        shown_unit = "" if unit == "1" else f" {unit}"
+        return text + shown_unit + "".join(f" or '{word}'" for word in self.words)
+
+    def typed_unit(self, value: Any) -> str:
+        """Return the unit of a text where it has the right dimension, else the SI unit."""
+        try:
+            written = units.split_quantity(value)[1] if isinstance(value, str) else self.unit
+            return written if units.parse_unit(written).dimension == units.parse_unit(self.unit).dimension else self.unit
+        except ValueError:
+            return self.unit
 
     def error(self, message: str, value: Any) -> Exception:
         """Return the error for a wrong value."""
         kind = "whole number, " if self.integer else ""
-        return custom_error(f"{message} (got {shown(value)}; allowed {kind}{self.range_text})")
+        return custom_error(f"{message} (got {shown(value)}; allowed {kind}{self.range_in(self.typed_unit(value))})")

@@ -32,8 +32,8 @@ class Scene(Shown, Part):
 
     Raises
     ------
-    pydantic.ValidationError
-        A ValueError that lists all mistakes with value, unit and allowed range.
+    SceneError
+        With all mistakes, one line each: value, unit and allowed range.
     """
 
     format_version: Annotated[int, Quantity(at_least=1, at_most=1, integer=True)] = 1

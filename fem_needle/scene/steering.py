@@ -19,6 +19,7 @@ from fem_needle.scene.signals import (
     limit_units,
     output_units,
 )
+from fem_needle.scene.spelling import known_name
 from fem_needle.scene.units import to_si
 
 __all__ = [
@@ -55,6 +56,7 @@ GAIN_KEYS: dict[str, tuple[str, ...]] = {
     "incremental": ("smallest_error", "smallest_change", "largest_command", "increment"),
     "proportional": ("proportional", "smallest_change", "largest_error"),
 }
+_NAMES = {"input": tuple(INPUT_UNITS), "output": (*output_units(), IMAGE_ERROR)}
 VARIANTS: dict[str, tuple[str, ...]] = {
     "none": (),
     "pid": (),
@@ -256,6 +258,9 @@ class Controller(Part):
     @classmethod
     def _units(cls, data: Any) -> Any:
         """Read gains with a unit, which follows from those of input and output."""
+        if isinstance(data, Mapping):
+            named = {key: data[key] for key in _NAMES if isinstance(data.get(key), str)}
+            data = dict(data) | {key: known_name(name, _NAMES[key]) for key, name in named.items()}
         gains = data.get("gains") if isinstance(data, Mapping) else None
         if not isinstance(gains, Mapping):
             return data

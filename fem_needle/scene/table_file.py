@@ -1,23 +1,21 @@
-"""Columns of a CSV file as tables in time.
-
-The header names the columns, each with a unit in brackets or without (SI):
-``time [s],speed [mm/s]``.
-"""
+"""Files inside a scene's folder, and columns of a CSV file as tables in time; a column without a unit is in SI."""
 
 from __future__ import annotations
 
-import csv
-import re
+import codecs
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from fem_needle.scene import units
+from fem_needle.scene.csv_table import CsvTable, read_csv
+from fem_needle.scene.spelling import known_name
 
 FILE_KEYS = ("file", "column")
 LARGEST_FILE = 50_000_000  # bytes
-MOST_CELLS = 3_000_000
+FEWEST_ROWS = 2
 
-_HEADER = re.compile(r"\s*([^\[\]]*?)\s*(?:\[([^\[\]]*)\])?\s*")
+_WIDE = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 def read_table(file: str, column: str, folder: Path | None) -> dict[str, Any]:
@@ -38,29 +36,28 @@ def read_table(file: str, column: str, folder: Path | None) -> dict[str, Any]:
         If the file is outside the folder, missing, no text, or lacks numbers.
     """
     try:
-        rows = csv_rows(read_text(inside_folder(file, folder)))
-    except csv.Error as error:
-        raise ValueError(f"{file!r} is no CSV: {error}") from None
+        return _column(read_csv(read_text(inside_folder(file, folder))), column)
     except ValueError as error:
         raise ValueError(f"{file!r} {error}") from None
-    if len(rows) < 3:
-        raise ValueError(f"{file!r} needs a header and at least two rows")
-    header = [split_header(cell) for cell in rows[0]]
-    names = [name for name, _ in header]
-    for wanted in ("time", column):
-        if names.count(wanted) != 1:
-            raise ValueError(f"{file!r} needs one column {wanted!r} (got {', '.join(names)})"[:300])
-    written = header[names.index("time")][1] or "s"
+
+
+def _column(table: CsvTable, column: str) -> dict[str, Any]:
+    """Return one column of a table over its times."""
+    table = replace(table, names=tuple(known_name(name, ("time", column)) for name in table.names))
+    mistakes = table.header_mistakes() + table.missing({"time": "s", column: None})
+    if mistakes:
+        raise ValueError("; ".join(mistakes))
+    if len(table.rows) < FEWEST_ROWS:
+        raise ValueError(f"needs a header and at least {FEWEST_ROWS} rows (got {len(table.rows)})")
+    time, value = table.names.index("time"), table.names.index(column)
+    written = table.units[time] or "s"
     time_unit = units.parse_unit(written)
     if time_unit.dimension != units.parse_unit("s").dimension:
-        raise ValueError(f"{file!r} has times in {written!r} (allowed a time, as s)")
-    times = column_numbers(rows, names.index("time"), file)
-    result: dict[str, Any] = {
-        "time": [time_unit.to_si(time) for time in times],
-        "value": column_numbers(rows, names.index(column), file),
-    }
-    unit = header[names.index(column)][1]
-    return result if unit is None else result | {"unit": unit}
+        raise ValueError(f"has times in {written!r} (allowed a time, as s)")
+    times = [time_unit.to_si(number) for number in table.numbers(time)]
+    table.rising(times)
+    result: dict[str, Any] = {"time": times, "value": table.numbers(value)}
+    return result if table.units[value] is None else result | {"unit": table.units[value]}
 
 
 def read_text(path: Path) -> str:
@@ -69,39 +66,24 @@ def read_text(path: Path) -> str:
     Raises
     ------
     ValueError
-        If it is missing, no plain file, huge, empty, or not UTF-8 text.
+        If it is missing, no plain file, huge, empty, or not text in UTF-8, or UTF-16 with its byte order mark.
     """
     if not path.is_file():
         raise ValueError(f"{path.name!r} is not a file" if path.exists() else f"{path.name!r} does not exist")
     if path.stat().st_size > LARGEST_FILE:
         raise ValueError(f"{path.name!r} is larger than {LARGEST_FILE / 1e6:g} MB")
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        content = path.read_bytes()
+        text = content.decode("utf-16" if content.startswith(_WIDE) else "utf-8-sig")
     except UnicodeDecodeError:
-        raise ValueError(f"{path.name!r} is not UTF-8 text") from None
+        raise ValueError(f"{path.name!r} is not UTF-8 text; save it as UTF-8") from None
     except OSError as error:
         raise ValueError(f"{path.name!r} cannot be read: {error.strerror}") from None
     if "\0" in text:
-        raise ValueError(f"{path.name!r} is not text")
+        raise ValueError(f"{path.name!r} is not text; save it as text in UTF-8")
     if not text.strip():
         raise ValueError(f"{path.name!r} is empty")
     return text
-
-
-def csv_rows(text: str) -> list[list[str]]:
-    """Return the rows of a CSV text that are not empty.
-
-    Raises
-    ------
-    ValueError
-        If it has more cells than fit into memory, each of which takes some 100 bytes.
-    csv.Error
-        If it is no CSV.
-    """
-    cells = text.count(",") + text.count("\n") + 1
-    if cells > MOST_CELLS:
-        raise ValueError(f"has {cells} cells (allowed up to {MOST_CELLS})")
-    return [row for row in csv.reader(text.splitlines()) if row]
 
 
 def inside_folder(file: str, folder: Path | None) -> Path:
@@ -121,28 +103,3 @@ def inside_folder(file: str, folder: Path | None) -> Path:
     if not path.is_relative_to(folder.resolve()):
         raise ValueError(f"{file!r} must lie inside the scene's folder")
     return path
-
-
-def split_header(cell: str) -> tuple[str, str | None]:
-    """Return name and unit of a column from its header; None without brackets."""
-    match = _HEADER.fullmatch(cell)
-    return (match[1], match[2]) if match else (cell.strip(), None)
-
-
-def column_numbers(rows: list[list[str]], index: int, file: str) -> list[float]:
-    """Return the numbers of a column below the header.
-
-    Raises
-    ------
-    ValueError
-        If a cell is missing or no number; says where.
-    """
-    numbers = []
-    for line, row in enumerate(rows[1:], start=2):
-        try:
-            numbers.append(float(row[index]))
-        except (ValueError, IndexError):
-            found = row[index] if index < len(row) else "nothing"
-            place = f"{file!r} row {line} column {index + 1}"
-            raise ValueError(f"{place} is not a number (got {found[:40]!r})") from None
-    return numbers

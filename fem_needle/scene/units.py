@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import pi
+
+from fem_needle.scene.unit_advice import unknown_unit
 
 # Exponents of kilogram, meter, second and radian. The angle is kept as a
 # dimension of its own, so that "2 deg" cannot pass for a plain number.
@@ -34,12 +36,14 @@ _SYMBOLS: dict[str, tuple[float, Dimension]] = {
     "cm": (1e-2, (0, 1, 0, 0)),
     "min": (60.0, (0, 0, 1, 0)),
     "deg": (pi / 180.0, (0, 0, 0, 1)),
+    "in": (0.0254, (0, 1, 0, 0)),
+    "gf": (9.80665e-3, (1, 1, -2, 0)),
+    "kgf": (9.80665, (1, 1, -2, 0)),
 }
-# The exact decimal powers, so that "127 mm" is 0.127 to the last bit.
-_DIVISORS = {1e-2: 1e2, 1e-3: 1e3, 1e-6: 1e6, 1e-9: 1e9}
+_WHOLE = 1e-12  # of a size: how near its inverse is to a whole number that divides exactly
 
 # Units of tables and pictures that are not those with millimeters in place of meters.
-_DISPLAYED = {"Pa": "GPa", "rad": "deg", "N/m^2": "kN/m^2", "N s/m^2": "N s/m^2"}
+_DISPLAYED = {"Pa": "GPa", "rad": "deg", "N/m^2": "kN/m^2", "N s/m^2": "N s/m^2", "kg/m": "g/m", "kg/m^3": "g/cm^3"}
 
 _NAMES: dict[Dimension, str] = {
     (0, 0, 0, 0): "plain number",
@@ -80,11 +84,17 @@ class Unit:
     def to_si(self, number: float) -> float:
         """Return ``number`` of this unit in SI.
 
-        A decimal fraction of a unit divides by the exact power of ten, which
-        rounds once where a product would round twice.
+        Fractions such as mm (1/1000) and mm/min (1/60000) divide by a whole number, which rounds once where a product would
+        round twice: "127 mm" is 0.127 and "300 mm/min" 0.005 to the last bit.
         """
-        divisor = _DIVISORS.get(self.size)
-        return number * self.size if divisor is None else number / divisor
+        return number * self.size if self.divisor is None else number / self.divisor
+
+    @cached_property
+    def divisor(self) -> float | None:
+        """The whole number whose inverse the size is, None where it is none."""
+        inverse = 1.0 / self.size
+        whole = float(round(inverse))
+        return whole if whole > 1.0 and abs(inverse - whole) <= _WHOLE * whole else None
 
 
 def dimension_name(dimension: Dimension) -> str:
@@ -128,7 +138,7 @@ def _product(part: str, text: str) -> tuple[float, Dimension]:
             continue
         match = _FACTOR.fullmatch(written)
         if match is None or match[1] not in _SYMBOLS:
-            raise ValueError(f"unknown unit {text!r} (at {written!r})")
+            raise ValueError(unknown_unit(text, written if match is None else match[1], _SYMBOLS))
         power = int(match[2] or 1)
         size *= _SYMBOLS[match[1]][0] ** power
         dimension = _added(dimension, _SYMBOLS[match[1]][1], power)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from fem_needle.errors import NeedleError, SuspiciousValueWarning
 from fem_needle.exact import exact_static
@@ -108,7 +107,7 @@ def examine(name: str, numbers: Numbers, modes: int | None, *, brief: bool = Fal
         figures = [*_of_run(run), *changed(numbers, modes, run, same), *_equilibrium(numbers, modes)]
         if not brief:
             figures += _automatic(numbers, modes)
-    except (NeedleError, ValidationError) as error:
+    except NeedleError as error:
         return Trial(name, announced=str(error)) if str(error) else Trial(name, crash="no message")
     except Exception as error:
         return Trial(name, crash=f"{type(error).__name__}: {error}")

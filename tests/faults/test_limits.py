@@ -8,8 +8,7 @@ import pytest
 
 from fem_needle import load_scene, run_scene, steer
 from fem_needle.errors import SceneError
-from fem_needle.scene import table_file
-from fem_needle.scene.table_file import csv_rows
+from fem_needle.scene import csv_table
 from tests.house.source import ROOT
 
 FAST = {"mean": 0.0, "amplitude": 0.01, "frequency": 1e12}
@@ -44,9 +43,9 @@ def test_too_many_repetitions_are_refused(command_line):
 
 
 def test_a_table_of_too_many_cells_is_refused_unread(monkeypatch):
-    monkeypatch.setattr(table_file.csv, "reader", None)
+    monkeypatch.setattr(csv_table, "_cells", None)
     with pytest.raises(ValueError, match=r"has 6000001 cells \(allowed up to 3000000\)"):
-        csv_rows("1,2\n" * 3_000_000)
+        csv_table.read_csv("a,b\n" * 3_000_000)
 
 
 SPARE = 700_000_000  # bytes beyond what a scene file may take: the interpreter, numpy, scipy

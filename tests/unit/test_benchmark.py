@@ -241,6 +241,7 @@ def test_json_and_nothing_else(command_line, tmp_path):
     [
         (("X",), "CASES: unknown case"),
         (("--repeats", "0"), "--repeats: too few"),
+        (("--repeats", "3", "--quick"), "--repeats: has no effect with --quick"),
         (("--rivals", "none"), "--rivals: no such folder"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from importlib import metadata
@@ -62,10 +63,12 @@ def test_check_shows_si_and_millimeters(run):
     assert rows["needle.length"] == "0.2 m 200 mm"
     assert rows["needle.bending_stiffness"] == "0.0157222 N m^2 15722.2 N mm^2"
     assert rows["tissue.layers.1.foundation_modulus"] == "20000 N/m^2 20 kN/m^2"
-    assert rows["loads.0.force"] == "0 to 0.5 N (table of 4 points)"
-    assert rows["support.guides.0.stiffness"] == "rigid"
+    assert rows["loads.0.force"] == "0 to 0.5 N (table of 4 points) 0 to 0.5 N (table of 4 points)"
+    assert rows["support.guides.0.stiffness"] == "rigid rigid"
     assert rows["run.duration"] == "9.5 s (until the insertion ends) 9.5 s"
     assert "not the Young's modulus" in out
+    table = [line for line in out.splitlines() if line.startswith("  ") and "." in line.strip().partition(" ")[0]]
+    assert all(len(re.split(r"\s{2,}", line.strip())) == 3 for line in table)
 
 
 def test_check_shows_a_closed_loop_in_the_units_of_its_input_and_output(run, tmp_path):
@@ -80,7 +83,7 @@ def test_check_shows_a_closed_loop_in_the_units_of_its_input_and_output(run, tmp
     assert rows["sensors.0.noise"] == "0.0001 m 0.1 mm"
     assert rows["controller.gains.proportional"] == "20 N/m 0.02 N/mm"
     assert rows["controller.gains.integral"] == "20 N/m s 0.02 N/mm s"
-    assert rows["actuators.lateral_force.rate"] == "10 N/s"
+    assert rows["actuators.lateral_force.rate"] == "10 N/s 10 N/s"
     assert {"sensors.0.resolution", "sensors.0.stations", "scatter.modulus"} & set(rows) == set()
 
 

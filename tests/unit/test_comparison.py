@@ -173,6 +173,8 @@ def test_a_reference_that_fails_is_an_error(monkeypatch):
         ({"modes": (2, 2)}, "modes: a number is given twice"),
         ({"modes": (0,)}, r"model\.modes"),
         ({"model": "fem", "modes": (2, 3)}, "does not change with them"),
+        ({"model": "fem", "modes": (3,)}, "does not change with them"),
+        ({"model": "fem", "basis": "inserted-length"}, "model.basis: has no effect"),
         ({"depths": ()}, "depths: got none"),
         ({"depths": (0.1, 0.3)}, "depths: got 0.1, 0.3; allowed different depths above"),
         ({"within": 0.0}, "within: out of range"),

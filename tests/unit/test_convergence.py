@@ -155,6 +155,7 @@ def test_columns_and_plain_data_say_the_same():
         ({"values": (4, 2_000_000)}, "numerics.elements"),
         ({"over": "time-step"}, "series of equilibria"),
         ({"over": "modes"}, "does not change"),
+        ({"elements": 8}, "numerics.elements: has no effect where it is refined"),
         ({"model": "no-such"}, "unknown model"),
     ],
 )

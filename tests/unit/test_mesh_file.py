@@ -349,3 +349,41 @@ def test_a_wrong_mesh_writes_nothing(command, tmp_path, options, message):
     assert message in err
     assert "Traceback" not in err
     assert list(tmp_path.iterdir()) == []
+
+
+WRITTEN = "1, 0., 0., 0.\n2, 0.1, 0., 0.\n3, 0.2, 0., 0.\n"
+ELEMENTS = "1, 1, 2\n2, 2, 3\n"
+GMSH = "$Nodes\n3\n1 0 0 0\n2 0.1 0 0\n3 0.2 0 0\n$EndNodes\n$Elements\n2\n1 1 2 0 1 1 2\n2 1 2 0 1 2 3\n$EndElements\n"
+READ = {
+    **{f"{kind}.inp": f"*NODE\n{WRITTEN}*ELEMENT, TYPE={kind}\n{ELEMENTS}" for kind in ("B31", "B33", "B23", "PIPE31", "T3D2")},
+    "two.inp": f"*Node\n1, 0., 0., 0.\n*Node, nset=b\n** more\n2, 0.1, 0., 0.\n3, 0.2, 0., 0.\n*Element, type=b33\n{ELEMENTS}",
+    "late.inp": f"*NODE\n1, 0., 0., 0.\n2, 0.1, 0., 0.\n*ELEMENT, TYPE=B31\n{ELEMENTS}*NODE\n3, 0.2, 0., 0.\n*NODE OUTPUT\nU\n",
+    "plain.msh": f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{GMSH}",
+    "blank.msh": f"\ufeff\n\n$MeshFormat\n2.1 0 8\n$EndMeshFormat\n{GMSH}",
+}
+NOT_READ = {
+    "shell.inp": (f"*NODE\n{WRITTEN}*ELEMENT, TYPE=SC8R\n1, 1, 2\n", r"elements of type SC8R .line 5. are not read; allowed B21"),
+    "quadratic.inp": (f"*NODE\n{WRITTEN}*ELEMENT, TYPE=B32\n1, 1, 2, 3\n", "holds line3 cells"),
+    "made.inp": ("*NODE\n1,0.,0.,0.\n3,0.2,0.,0.\n*NGEN\n1,3\n", r"\*NGEN in line 4 is not read"),
+    "leads.inp": ("*INCLUDE, INPUT=nodes.inp\n", r"\*INCLUDE in line 1 is not read"),
+    "parts.inp": (f"*NODE\n{WRITTEN}*NODE\n{WRITTEN}", "node 1 is there twice"),
+    "one.msh": ("$NOD\n3\n", "Gmsh's format 1 .* is not read; save it in format 2.2 or 4.1"),
+    "three.msh": (f"$MeshFormat\n3 0 8\n$EndMeshFormat\n{GMSH}", "format 3 of Gmsh is not read"),
+    "other.msh": (f"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n{GMSH}", "what follows is not format 4.1 of Gmsh, as its header says"),
+    "none.msh": (GMSH, "no .MeshFormat with a version of Gmsh"),
+}
+
+
+@pytest.mark.parametrize("name", READ)
+def test_variants_of_abaqus_and_gmsh_are_read(tmp_path, name):
+    (tmp_path / name).write_text(READ[name], encoding="utf-8")
+    assert read_mesh(tmp_path / name).tolist() == [0.0, 0.1, 0.2]
+
+
+@pytest.mark.parametrize("name", NOT_READ)
+def test_what_is_not_read_is_named(tmp_path, name):
+    content, message = NOT_READ[name]
+    (tmp_path / name).write_text(content)
+    with pytest.raises(SceneError, match=message) as caught:
+        read_mesh(tmp_path / name)
+    assert "damaged" not in str(caught.value)

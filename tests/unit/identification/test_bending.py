@@ -50,7 +50,7 @@ def test_sections():
     assert section_moment("solid", t) == pytest.approx(1.277e-13, rel=1e-3)
     assert section_moment("square", t) / section_moment("solid", t) == pytest.approx(16.0 / (3.0 * np.pi))
     assert section_moment("tube", t, 1.0e-3) == pytest.approx(section_moment("solid", t) - section_moment("solid", 1.0e-3))
-    for wrong in (("round", t), ("solid", 0.0), ("tube", 1e-3, 1e-3), ("solid", 1e-3, 5e-4)):
+    for wrong in (("round", t), ("solid", 0.0), ("tube", 1e-3, 1e-3), ("tube", 1e-3), ("solid", 1e-3, 5e-4)):
         with pytest.raises(SceneError, match="section: "):
             section_moment(*wrong)
 

@@ -2,7 +2,7 @@ import pytest
 
 from fem_needle import shipped
 from fem_needle.checks import notes, suspicious, warn_if_suspicious
-from fem_needle.errors import SuspiciousValueWarning
+from fem_needle.errors import SceneError, SuspiciousValueWarning
 from fem_needle.scene import Controller, Friction, Guide, Insertion, LateralLoad, Layer, Run, Sensor, Support, Tissue
 from fem_needle.scene_file import load_scene, parse_scene
 from tests.unit.scene.examples import hub_scene
@@ -137,3 +137,13 @@ def test_an_ordinary_loop_is_not_suspicious():
     assert suspicious(free) == ()
     assert suspicious(free.with_value("controller.output", "depth")) != ()
     assert suspicious(free.with_values({"controller.output": "depth", "controller.kind": "none"})) == ()
+
+
+@pytest.mark.parametrize(("position", "told"), [("30 mm", True), ("-30 mm", False)])
+def test_a_guide_behind_the_skin_is_asked_back(position, told):
+    values = {"support": {"kind": "hub", "guides": [{"position": position}]}, "insertion.final_depth": "100 mm"}
+    if not told:
+        load_scene("thesis").with_values(values)
+        return
+    with pytest.raises(SceneError, match="negative is before the skin: did you mean -30 mm"):
+        load_scene("thesis").with_values(values)

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from fem_needle.errors import SceneError
 from fem_needle.scene import (
+    Controller,
     Friction,
     Guide,
     Initial,
@@ -60,7 +62,7 @@ def test_a_needle_given_directly_has_no_known_radius():
     ],
 )
 def test_a_needle_in_two_ways_or_none_is_refused(keys, message):
-    with pytest.raises(ValidationError, match=message):
+    with pytest.raises(SceneError, match=message):
         Needle(length=0.2, **keys)
 
 
@@ -97,19 +99,19 @@ def test_hard_ranges(part, key, allowed, refused):
     for value in allowed:
         part(value)
     for value in (*refused, float("nan"), float("inf"), True, [1.0]):
-        with pytest.raises(ValidationError, match=key) as caught:
+        with pytest.raises(SceneError, match=key) as caught:
             part(value)
         assert "allowed" in str(caught.value)
 
 
 def test_a_message_has_name_value_unit_and_range():
-    with pytest.raises(ValidationError) as caught:
+    with pytest.raises(SceneError) as caught:
         Needle(length="300 m", bending_stiffness=1.0, mass_per_length=1.0)
-    assert "length\n  out of range (got '300 m'; allowed 0.0001 to 100 m)" in str(caught.value)
+    assert "length: out of range (got '300 m'; allowed 0.0001 to 100 m)" in str(caught.value)
 
 
 def test_a_mesh_file_needs_its_folder():
-    with pytest.raises(ValidationError):
+    with pytest.raises(SceneError):
         Numerics(mesh="file")
 
 
@@ -117,7 +119,7 @@ def test_a_mesh_file_needs_its_folder():
 def test_the_variants_of_the_thesis_imply_a_fixed_frame(variant):
     assert Model(variant=variant).kinematics == "fixed-frame"
     assert Model(variant=variant, kinematics="fixed-frame").kinematics == "fixed-frame"
-    with pytest.raises(ValidationError, match="is fixed-frame"):
+    with pytest.raises(SceneError, match="is fixed-frame"):
         Model(variant=variant, kinematics="material")
 
 
@@ -175,7 +177,7 @@ def test_values_that_vary_in_time(value, stored):
     ],
 )
 def test_wrong_values_that_vary_in_time(value, message):
-    with pytest.raises(ValidationError, match=message):
+    with pytest.raises(SceneError, match=message):
         Support(kind="hub", hub_deflection=value)
 
 
@@ -183,15 +185,15 @@ def test_wrong_values_that_vary_in_time(value, message):
     "factor", [Table(time=[0, 1], value=[1.0, -0.1]), Sinusoid(mean=1.0, amplitude=-1.1, frequency=1.0)]
 )
 def test_the_stiffness_factor_is_never_negative(factor):
-    with pytest.raises(ValidationError, match=r"stiffness_factor\n  out of range \(got -0.1; allowed at least 0\)"):
+    with pytest.raises(SceneError, match=r"stiffness_factor: out of range \(got -0.1; allowed at least 0\)"):
         Tissue(stiffness_factor=factor)
 
 
 @pytest.mark.parametrize(
     ("layers", "message"),
     [
-        ([Layer(foundation_modulus=1.0), Layer(start=0.1, foundation_modulus=1.0)], r"layers.1.start\n.*overlap"),
-        ([Layer(start=0.1, foundation_modulus=1.0), Layer(end=0.2, foundation_modulus=1.0)], r"layers.0.start\n.*0.2 m"),
+        ([Layer(foundation_modulus=1.0), Layer(start=0.1, foundation_modulus=1.0)], r"layers.1.start: .*overlap"),
+        ([Layer(start=0.1, foundation_modulus=1.0), Layer(end=0.2, foundation_modulus=1.0)], r"layers.0.start: .*0.2 m"),
         (
             [Layer(name="a", end=0.1, foundation_modulus=1.0), Layer(name="a", start=0.1, foundation_modulus=1.0)],
             "names must differ",
@@ -199,7 +201,7 @@ def test_the_stiffness_factor_is_never_negative(factor):
     ],
 )
 def test_layers_overlap_or_share_a_name(layers, message):
-    with pytest.raises(ValidationError, match=message):
+    with pytest.raises(SceneError, match=message):
         Tissue(layers=layers)
 
 
@@ -216,23 +218,23 @@ def test_layers_may_touch_and_leave_gaps_in_any_order():
 @pytest.mark.parametrize("keys", [{"hub_deflection": 1e-3}, {"hub_angle": "1 deg"}, {"guides": [Guide(position=-0.1)]}])
 def test_nothing_outside_under_entry(keys):
     Support(kind="hub", **keys)
-    with pytest.raises(ValidationError, match=f"{next(iter(keys))}\n.*no meaning under 'entry'"):
+    with pytest.raises(SceneError, match=f"{next(iter(keys))}: .*no meaning under 'entry'"):
         Support(kind="entry", **keys)
 
 
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"hub_rotation": "free"}, "hub_rotational_inertia\n.*required"),
-        ({"hub_rotation": "free", "hub_rotational_inertia": 1e-5, "hub_angle": 0.1}, "hub_angle\n.*no prescribed angle"),
-        ({"hub_torque": 0.1}, "hub_torque\n.*no meaning on a fixed hub"),
-        ({"hub_rotational_inertia": 1e-5}, "hub_rotational_inertia\n.*no meaning on a fixed hub"),
+        ({"hub_rotation": "free"}, "hub_rotational_inertia: .*required"),
+        ({"hub_rotation": "free", "hub_rotational_inertia": 1e-5, "hub_angle": 0.1}, "hub_angle: .*no prescribed angle"),
+        ({"hub_torque": 0.1}, "hub_torque: .*no meaning on a fixed hub"),
+        ({"hub_rotational_inertia": 1e-5}, "hub_rotational_inertia: .*no meaning on a fixed hub"),
         ({"hub_rotation": "loose"}, "hub_rotation"),
     ],
 )
 @pytest.mark.parametrize("kind", ["hub", "entry"])
 def test_what_a_free_hub_needs_and_a_fixed_one_does_not_have(kind, keys, message):
-    with pytest.raises(ValidationError, match=message):
+    with pytest.raises(SceneError, match=message):
         Support(kind=kind, **keys)
 
 
@@ -243,51 +245,51 @@ def test_a_free_hub(kind):
 
 
 def test_two_guides_at_one_place():
-    with pytest.raises(ValidationError, match="two guides at one place"):
+    with pytest.raises(SceneError, match="two guides at one place"):
         Support(kind="hub", guides=[Guide(position=-0.1), Guide(position=-0.1, stiffness=3.0)])
 
 
 @pytest.mark.parametrize("keys", [{}, {"force": 1.0, "bevel_coefficient": 1.0}])
 def test_a_tip_load_is_a_force_or_a_bevel(keys):
-    with pytest.raises(ValidationError, match="exactly one"):
+    with pytest.raises(SceneError, match="exactly one"):
         TipLoad(**keys)
 
 
 def test_a_lateral_load_needs_a_force():
-    with pytest.raises(ValidationError, match="force"):
+    with pytest.raises(SceneError, match="force"):
         LateralLoad(position=-0.1)
 
 
 def test_tip_displaced_and_its_deflection_belong_together():
     assert Initial(shape="tip-displaced", tip_deflection="1 mm").tip_deflection == 1e-3
-    with pytest.raises(ValidationError, match="required by shape"):
+    with pytest.raises(SceneError, match="required by shape"):
         Initial(shape="tip-displaced")
-    with pytest.raises(ValidationError, match="no meaning with shape"):
+    with pytest.raises(SceneError, match="no meaning with shape"):
         Initial(tip_deflection=1e-3)
 
 
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"kind": "hold"}, "initial_depth\n.*required"),
-        ({"kind": "speed", "initial_depth": 0.1}, "speed\n.*required"),
-        ({"kind": "speed", "speed": 0.1, "final_depth": 0.2}, "initial_depth\n.*required"),
-        ({"kind": "profile"}, "depth\n.*required"),
-        ({"kind": "speed", "initial_depth": 0.1, "speed": 0.1}, "final_depth\n.*required by a plain speed"),
+        ({"kind": "hold"}, "initial_depth: .*required"),
+        ({"kind": "speed", "initial_depth": 0.1}, "speed: .*required"),
+        ({"kind": "speed", "speed": 0.1, "final_depth": 0.2}, "initial_depth: .*required"),
+        ({"kind": "profile"}, "depth: .*required"),
+        ({"kind": "speed", "initial_depth": 0.1, "speed": 0.1}, "final_depth: .*required by a plain speed"),
         ({"kind": "speed", "initial_depth": 0.1, "speed": -0.1, "final_depth": 0.2}, "not where the speed leads.*below"),
         ({"kind": "speed", "initial_depth": 0.1, "speed": 0.1, "final_depth": 0.1}, "not where the speed leads.*above"),
         ({"kind": "speed", "initial_depth": 0.1, "speed": 0.0, "final_depth": 0.1}, "does not move"),
-        ({"kind": "hold", "initial_depth": 0.1, "speed": 0.1}, "speed\n.*does not belong.*'hold'"),
-        ({"kind": "speed", "initial_depth": 0.1, "speed": 0.1, "depth": 0.1, "final_depth": 1.0}, "depth\n.*not belong"),
+        ({"kind": "hold", "initial_depth": 0.1, "speed": 0.1}, "speed: .*does not belong.*'hold'"),
+        ({"kind": "speed", "initial_depth": 0.1, "speed": 0.1, "depth": 0.1, "final_depth": 1.0}, "depth: .*not belong"),
         ({"kind": "profile", "depth": {"time": [0, 1], "value": [0.1, 0.2]}, "initial_depth": 0.15}, "starts elsewhere"),
         (
             {"kind": "speed", "initial_depth": 0.1, "speed": {"time": [0, 1], "value": [1, 0]}, "final_depth": 1.0},
-            "final_depth\n.*never reached",
+            "final_depth: .*never reached",
         ),
     ],
 )
 def test_insertions_that_contradict_themselves(keys, message):
-    with pytest.raises(ValidationError, match=message):
+    with pytest.raises(SceneError, match=message):
         Insertion(**keys)
 
 
@@ -296,3 +298,52 @@ def test_when_an_insertion_ends():
     assert Insertion(kind="speed", initial_depth=0.1, speed=-0.05, final_depth=0.0).end_time == pytest.approx(2.0)
     assert Insertion(kind="profile", depth=Table(time=[0, 7], value=[0.1, 0.2])).end_time == 7.0
     assert Insertion(kind="speed", initial_depth=0.1, speed=Sinusoid(amplitude=0.1, frequency=1)).end_time is None
+
+
+@pytest.mark.parametrize(
+    ("make", "mistakes"),
+    [
+        (lambda: Layer(foundation_modulus=1.0, dampng=2), ("dampng: unknown key; did you mean 'damping'?",)),
+        (
+            lambda: Needle(length="200 mmm", bending_stiffness=1.0, mass_per_length=1.0),
+            ("length: unknown unit 'mmm'; did you mean 'mm'? (got '200 mmm'; allowed 0.0001 to 100 m)",),
+        ),
+        (Layer, ("foundation_modulus: is required",)),
+        (lambda: Guide(position="1 N", stiffness=-1.0), ("position: ", "stiffness: out of range (got -1; allowed above 0 N/m")),
+        (lambda: Tissue(layers=[{"foundation_modulus": 1.0, "dampng": 1.0}]), ("layers.0.dampng: unknown key; did you mean",)),
+    ],
+)
+def test_constructors_tell_what_files_tell(make, mistakes):
+    with pytest.raises(SceneError) as caught:
+        make()
+    assert len(caught.value.mistakes) == len(mistakes)
+    assert all(line.startswith(said) for line, said in zip(caught.value.mistakes, mistakes, strict=True)), caught.value.mistakes
+
+
+@pytest.mark.parametrize(
+    ("text", "millimeters"),
+    [("18 G", 1.27), ("18G", 1.27), ("14 ga", 2.108), ("22-gauge", 0.7176), ("30 G", 0.3112), ("0.05 in", 1.27)],
+)
+def test_an_outer_diameter_may_be_a_gauge(text, millimeters):
+    needle = Needle(length=0.2, outer_diameter=text, inner_diameter="0.1 mm", youngs_modulus="200 GPa", density=8000)
+    assert needle.outer_diameter == pytest.approx(1e-3 * millimeters, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"outer_diameter": "99 G"}, r"outer_diameter: is no known gauge; known: 7 G to 30 G \(got '99 G'; allowed above 0 m"),
+        ({"inner_diameter": "18 G", "outer_diameter": "2 mm"}, "inner_diameter: .*a gauge is known for an outer diameter alone"),
+        ({"length": "0.01 mm"}, r"length: out of range \(got '0.01 mm'; allowed 0.1 to 100000 mm\)"),
+        ({"length": "20000 in"}, "length: out of range .*allowed 0.00393701 to 3937.01 in"),
+    ],
+)
+def test_messages_are_in_units_that_were_typed(keys, message):
+    with pytest.raises(SceneError, match=message):
+        Needle(**({"length": 0.2, "outer_diameter": 1e-3, "youngs_modulus": "200 GPa", "density": 8000} | keys))
+
+
+@pytest.mark.parametrize("name", ["tip deflection", "Tip-Deflection", "tip_deflection", "image error"])
+def test_names_are_understood_as_people_type_them(name):
+    found = Controller(kind="pid", input="push force", output=name, gains={"proportional": "1 N/m"})
+    assert (found.input, found.output) == ("push_force", "image_error" if "image" in name else "tip_deflection")

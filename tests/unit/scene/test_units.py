@@ -28,10 +28,19 @@ from fem_needle.scene import units
         ("-4e1 µm", "m", -4e-5),
         ("1 kg m/s^2", "N", 1.0),
         ("2 1/s", "Hz", 2.0),
+        ("8 in", "m", 0.2032),
+        ("30 gf", "N", 0.2941995),
+        ("2 kgf", "N", 19.6133),
+        ("5 mm/min", "m/s", 5e-3 / 60),
     ],
 )
 def test_a_text_becomes_si(text, unit, value):
     assert units.to_si(text, unit) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(("number", "speed"), [(300, 0.005), (60, 0.001), (90, 0.0015), (7, 7 / 60000)])
+def test_millimeters_per_minute_round_once(number, speed):
+    assert units.to_si(f"{number} mm/min", "m/s") == speed
 
 
 @pytest.mark.parametrize("text", ["127 mm", "0.1 mm", "12.7 mm", "33.3 mm", "7 mm"])
@@ -44,7 +53,16 @@ def test_a_decimal_fraction_rounds_once(text):
     [
         ("127 mm", "m/s", "expected speed in m/s, not length"),
         ("2 deg", "m", "expected length in m, not angle"),
-        ("2 furlong", "m", "unknown unit"),
+        ("2 furlong", "m", "unknown unit 'furlong' .at 'furlong'.; known: m, cm, in"),
+        ("200 gpa", "Pa", "unknown unit 'gpa'; did you mean 'GPa'"),
+        ("200 mpa", "Pa", "did you mean 'MPa' or 'mPa'"),
+        ("5 mm/sec", "m/s", "unknown unit 'mm/sec'; did you mean 'mm/s'"),
+        ("5 millimeters/s", "m/s", "did you mean 'mm/s'"),
+        ("8 inches", "m", "did you mean 'in'"),
+        ("3 Newtons", "N", "did you mean 'N'"),
+        ("3 kn", "N", "did you mean 'kN'"),
+        ("5 mmm", "m", "did you mean 'mm'"),
+        ("18 G", "m", "a gauge is known for an outer diameter alone"),
         ("2 m/s/s", "m", "more than one division"),
         ("0.2", "m", "needs a unit"),
         ("m", "m", "not a number"),

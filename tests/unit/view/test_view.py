@@ -261,6 +261,7 @@ def test_a_page_by_the_command(view, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (("--renderer", "vtk", "--html", "a.html"), "--renderer: has no effect without --picture"),
         (("--renderer", "paint", "--picture", "a.png"), "is not a choice (got 'paint'; allowed auto, vtk, matplotlib)"),
         (("--time", "9", "--picture", "a.png"), "--time: not in the run (got 9; allowed 0 to 0.6 s)"),
         (("--picture", "a.jpg"), "--picture: is no PNG file by its name (got 'a.jpg'; allowed a name that ends in .png)"),
