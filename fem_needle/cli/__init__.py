@@ -7,6 +7,7 @@ entry point of the group ``fem_needle.commands``.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import warnings
@@ -49,6 +50,7 @@ def main() -> None:
     """Run the command line; exit status 0 done, 2 wrong input, 1 failed."""
     warnings.simplefilter("ignore", SuspiciousValueWarning)  # the commands show them themselves
     _replace_unknown_letters()
+    os.environ["MPLBACKEND"] = "agg"  # pictures are files; another one, or none of that name, would stop matplotlib's import
     try:
         _require_folder()
         with _ended_as_interrupted(), compilations_shown():
