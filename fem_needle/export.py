@@ -7,9 +7,9 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from fem_needle.atomic_file import write_atomically
+from fem_needle.atomic_file import check_target, write_file, writing
 from fem_needle.csv_file import series_csv, station_csv
-from fem_needle.errors import ComputationError, SceneError
+from fem_needle.errors import SceneError
 from fem_needle.folder_lock import FolderLock
 from fem_needle.matlab_file import matlab_file
 from fem_needle.run_target import FRAMES
@@ -56,9 +56,7 @@ def export_run(run: Trajectory, kind: str, path: Path, *, force: bool = False) -
     for target in targets:
         check_target(target, force=force)
     for target, content in targets.items():
-        with _writing(target):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(target, content(run))
+        write_file(target, content(run))
     return tuple(targets)
 
 
@@ -69,33 +67,12 @@ def _targets(run: Trajectory, kind: str, path: Path) -> dict[Path, Callable[[Tra
     return {path / name: content for name, content in (_FILES[kind] | along).items()}
 
 
-def check_target(target: Path, *, force: bool) -> None:
-    """Refuse to overwrite a folder or, without ``force``, a file, and places that cannot be.
-
-    Raises
-    ------
-    SceneError
-        That says why.
-    """
-    try:
-        exists, is_folder = target.exists(), target.is_dir()
-        holder = next(folder for folder in target.absolute().parents if folder.exists())
-    except (OSError, ValueError) as error:
-        raise SceneError(f"{target}: cannot be written: {error}") from None
-    if is_folder:
-        raise SceneError(f"{target}: cannot be written: it is a folder")
-    if not holder.is_dir():
-        raise SceneError(f"{target}: cannot be written: {holder} is no folder")
-    if exists and not force:
-        raise SceneError(f"{target}: exists already; --force (force=True) replaces it")
-
-
 def _export_frames(run: Trajectory, folder: Path, *, force: bool) -> tuple[Path, ...]:
     """Write `deflection.pvd` with its frames, as the run itself does."""
     collection = folder / COLLECTION
     check_target(collection, force=force)
     _check_frames(folder, force=force)
-    with _writing(collection), _held(folder):
+    with writing(collection), _held(folder):
         collection.unlink(missing_ok=True)
         for name, pattern in FRAMES:
             for old in (folder / name).glob(pattern):
@@ -127,11 +104,3 @@ def _held(folder: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
-
-
-@contextmanager
-def _writing(target: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise ComputationError(f"{target} cannot be written: {error.strerror or error}") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from functools import cache
 from io import BytesIO
 from textwrap import wrap
 from typing import Any
@@ -40,6 +41,7 @@ STYLE: Any = {
     "xtick.color": INK,
     "ytick.color": INK,
 }
+_OF_THE_PROCESS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone", "date.epoch", "tk.window_focus")
 FORMATS = ("png", "svg", "pdf")
 # Letters stay letters, which can be searched and edited; names inside a file do not change from one writing to the next.
 _VECTOR_STYLE: Any = {"svg.fonttype": "none", "svg.hashsalt": "fem-needle", "pdf.fonttype": 42}
@@ -71,9 +73,15 @@ def write_title(figure: Figure, title: str, ending: str = "") -> None:
     figure.suptitle(lines, x=0.01, ha="left", fontsize=TITLE_SIZE, parse_math=False)
 
 
-def shared_style() -> AbstractContextManager[None]:
-    """Return the context manager in which pictures are drawn and saved."""
-    return mpl.rc_context(STYLE)
+def shared_style(**more: Any) -> AbstractContextManager[None]:
+    """Return the context manager in which pictures are drawn and saved: matplotlib's own defaults, whatever a user has set."""
+    return mpl.rc_context(_defaults() | STYLE | more)
+
+
+@cache
+def _defaults() -> dict[str, Any]:
+    """Return matplotlib's settings as it comes, but the backend, which pictures do not need."""
+    return {name: value for name, value in mpl.rcParamsDefault.items() if name not in _OF_THE_PROCESS}
 
 
 def png_bytes(figure: Figure) -> bytes:
@@ -104,6 +112,6 @@ def picture_bytes(figure: Figure, kind: str = "png") -> bytes:
     if kind not in FORMATS:
         raise ValueError(f"format: is not a choice (got {kind!r}; allowed {', '.join(FORMATS)})")
     content = BytesIO()
-    with mpl.rc_context(STYLE | _VECTOR_STYLE):
+    with shared_style(**_VECTOR_STYLE):
         figure.savefig(content, format=kind, metadata=_METADATA[kind])
     return content.getvalue()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from fem_needle.atomic_file import is_unfinished
+from fem_needle.atomic_file import check_place, is_unfinished
 from fem_needle.errors import SceneError
 from fem_needle.folder_lock import FolderLock, is_locked
 from fem_needle.manifest import FILE as MANIFEST
@@ -61,6 +61,8 @@ class RunTarget:
         """
         try:
             there = self.path.exists() or self.path.is_symlink()
+            if not there or self.numbered:
+                check_place(self.path)
             if not there or (self.numbered and not self.force):
                 return
             if is_locked(self.path):

@@ -25,6 +25,7 @@ def validate(out: Out = None, quick: Quick = False) -> None:
     """
     from reduced_model.validation.page import page, sections, write_page
 
+    _check(out)
     found = sections(quick=quick)
     if out is None:
         typer.echo(page(found, quick=quick), nl=False)
@@ -40,9 +41,18 @@ def experiments(out: Out = None) -> None:
     """
     from reduced_model.steering.page import page, sections, write_page
 
+    _check(out)
     found = sections()
     if out is None:
         typer.echo(page(found), nl=False)
         return
     for path in write_page(out, found):
         typer.echo(f"wrote {path}")
+
+
+def _check(page: Path | None) -> None:
+    """Refuse, before minutes of work, a page that cannot be written; one that is there is made anew."""
+    from fem_needle.atomic_file import check_target
+
+    if page is not None:
+        check_target(page, force=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from fem_needle.atomic_file import json_bytes, write_atomically
+from fem_needle.atomic_file import json_bytes, write_file
 from fem_needle.benchmark.result import Benchmark, benchmark_from_dict
-from fem_needle.errors import ComputationError, SceneError
+from fem_needle.errors import SceneError
 
 
 def write_record(study: Benchmark, folder: Path) -> Path:
@@ -19,11 +19,7 @@ def write_record(study: Benchmark, folder: Path) -> Path:
         If it cannot be written.
     """
     path = folder / f"{study.date[:10]}-{(study.commit or 'unknown').rstrip('+')}.json"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, json_bytes(study.to_dict()))
-    except OSError as error:
-        raise ComputationError(f"{path}: cannot be written: {error}") from error
+    write_file(path, json_bytes(study.to_dict()))
     return path
 
 

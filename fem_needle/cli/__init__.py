@@ -7,12 +7,15 @@ entry point of the group ``fem_needle.commands``.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module, metadata
+from io import TextIOWrapper
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -46,7 +49,10 @@ FAILED = 1
 def main() -> None:
     """Run the command line; exit status 0 done, 2 wrong input, 1 failed."""
     warnings.simplefilter("ignore", SuspiciousValueWarning)  # the commands show them themselves
+    _replace_unknown_letters()
+    os.environ["MPLBACKEND"] = "agg"  # pictures are files; another one, or none of that name, would stop matplotlib's import
     try:
+        _require_folder()
         with _ended_as_interrupted(), compilations_shown():
             build_application()()
     except SceneError as error:
@@ -55,6 +61,29 @@ def main() -> None:
         _stop((str(error),), FAILED)
     except MemoryError as error:
         _stop((no_memory(error),), FAILED)
+    except OSError as error:  # a full disk, a folder that vanished: of what no command expects
+        _stop((str(error),), FAILED)
+
+
+def _replace_unknown_letters() -> None:
+    """Let a terminal that does not know a letter (ASCII, cp1252) show another in its place: the work is done by then."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="replace")
+
+
+def _require_folder() -> None:
+    """Refuse to begin in a folder that is gone, in which no path means anything.
+
+    Raises
+    ------
+    SceneError
+        That says so.
+    """
+    try:
+        Path.cwd()
+    except OSError:
+        raise SceneError("the working folder: has been removed or cannot be read (enter another one with cd)") from None
 
 
 @contextmanager

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fem_needle.cli.run_session import print_json
 from fem_needle.cli.scene_commands import SceneArgument
 from fem_needle.cli.short_path import short_path
-from fem_needle.errors import ComputationError
 
 if TYPE_CHECKING:
     from fem_needle.scene import Scene
@@ -93,7 +93,7 @@ def _analyze(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet
     from fem_needle.analysis.matlab import analysis_matlab
     from fem_needle.analysis.picture import analysis_picture
     from fem_needle.analysis.study import analyze as compute
-    from fem_needle.atomic_file import json_bytes, write_atomically
+    from fem_needle.atomic_file import write_file
     from fem_needle.cli.analyze_table import show_analysis
 
     folder.check()
@@ -102,11 +102,8 @@ def _analyze(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet
     for warning in analysis.warnings:
         typer.echo(f"warning: {warning}", err=True)
     written = folder.write(scene, plain, analysis.columns(), analysis_picture(analysis))
-    try:
-        write_atomically(written / f"{NAME}.mat", analysis_matlab(analysis))
-    except OSError as error:
-        raise ComputationError(f"{written}: cannot be written: {error}") from error
+    write_file(written / f"{NAME}.mat", analysis_matlab(analysis))
     if quiet:
-        typer.echo(json_bytes(plain).decode(), nl=False)
+        print_json(plain)
     else:
         show_analysis(analysis, short_path(written))

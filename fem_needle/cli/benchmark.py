@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fem_needle.cli.run_session import print_json
 from fem_needle.errors import SceneError
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def benchmark(
 
     Example: fem-needle benchmark S --quick
     """
+    from fem_needle.atomic_file import check_place
     from fem_needle.benchmark.cases import cases_of
     from fem_needle.benchmark.rivals import Rivals, load_rivals
     from fem_needle.run_target import RunTarget
@@ -55,6 +57,8 @@ def benchmark(
     if repeats is not None and (quick or repeats < 1):
         why = "has no effect with --quick, one round" if quick else "too few"
         raise SceneError(f"--repeats: {why} (got {repeats}; allowed 1 or more without --quick)")
+    if record is not None:
+        check_place(record / RUNS.name)
     chosen = cases_of(cases or ())
     others = Rivals() if rivals is None else load_rivals(rivals)
     folder = StudyFolder(NAME, RunTarget(out or RUNS / NAME, force, numbered=out is None, for_study=True))
@@ -90,7 +94,6 @@ def _measure(
 
 def _write(study: Benchmark, cases: tuple[Case, ...], folder: StudyFolder, record: Path | None, *, quiet: bool) -> None:
     """Write and show a benchmark."""
-    from fem_needle.atomic_file import json_bytes
     from fem_needle.benchmark.picture import benchmark_picture
     from fem_needle.benchmark.record import write_record
     from fem_needle.benchmark.scaling_picture import scaling_picture
@@ -101,6 +104,6 @@ def _write(study: Benchmark, cases: tuple[Case, ...], folder: StudyFolder, recor
     written = folder.write(cases[0].scene, plain, study.columns(), benchmark_picture(study), pictures)
     kept = None if record is None else write_record(study, record)
     if quiet:
-        typer.echo(json_bytes(plain).decode(), nl=False)
+        print_json(plain)
     else:
         show_benchmark(study, written, kept)

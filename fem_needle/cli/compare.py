@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fem_needle.cli.run_session import print_json
 from fem_needle.cli.scene_commands import SceneArgument
 from fem_needle.errors import ComputationError
 
@@ -90,7 +91,6 @@ def _length(text: str) -> float:
 
 def _compare(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet: bool) -> Comparison:
     """Compute, write and show a comparison."""
-    from fem_needle.atomic_file import json_bytes
     from fem_needle.checks import suspicious
     from fem_needle.cli.compare_table import show_comparison
     from fem_needle.comparison.picture import comparison_picture
@@ -104,7 +104,7 @@ def _compare(scene: Scene, wanted: dict[str, Any], folder: StudyFolder, *, quiet
     plain = comparison.to_dict()
     written = folder.write(scene, plain, comparison.columns(), comparison_picture(comparison))
     if quiet:
-        typer.echo(json_bytes(plain).decode(), nl=False)
+        print_json(plain)
     else:
         show_comparison(comparison, written)
     return comparison

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from fem_needle.cli.run_options import by_path
+from fem_needle.cli.run_session import print_json
 from fem_needle.cli.scene_commands import SceneArgument
 from fem_needle.errors import ComputationError, SceneError
 
@@ -71,7 +72,6 @@ def converge(
 
 def _study(scene: Scene, over: str, values: str | None, folder: StudyFolder, *, quiet: bool) -> ConvergenceStudy:
     """Compute, write and show a study."""
-    from fem_needle.atomic_file import json_bytes
     from fem_needle.checks import suspicious
     from fem_needle.cli.converge_table import show_study
     from fem_needle.convergence.picture import convergence_picture
@@ -83,7 +83,7 @@ def _study(scene: Scene, over: str, values: str | None, folder: StudyFolder, *, 
     study = compute(scene, over, None if values is None else _numbers(over, values))  # type: ignore[arg-type]
     written = folder.write(scene, study.to_dict(), study.columns(), convergence_picture(study))
     if quiet:
-        typer.echo(json_bytes(study.to_dict()).decode(), nl=False)
+        print_json(study.to_dict())
     else:
         show_study(study, written)
     return study

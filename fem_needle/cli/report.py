@@ -24,7 +24,7 @@ def report(
 
     Example: fem-needle report runs/thesis
     """
-    from fem_needle.export import check_target
+    from fem_needle.atomic_file import check_target
     from fem_needle.report import read_folder, write_report
 
     path = run / FILE if out is None else out

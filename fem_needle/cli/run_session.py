@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -80,10 +81,15 @@ def _stop(writer: RunFolderWriter, run: Trajectory | None, reason: str, message:
 
 
 def print_json(data: dict[str, Any]) -> None:
-    """Print plain data as JSON."""
+    """Print plain data as JSON; letters that the output does not know are escaped, so that it stays JSON."""
     from fem_needle.atomic_file import json_bytes
 
-    typer.echo(json_bytes(data).decode(), nl=False)
+    text = json_bytes(data).decode()
+    try:
+        text.encode(sys.stdout.encoding or "utf-8")
+    except (UnicodeEncodeError, LookupError):
+        text = json_bytes(data, escaped=True).decode()
+    typer.echo(text, nl=False)
 
 
 def show_rows(title: str, rows: Iterable[Row]) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from fem_needle.cli.run_session import print_json
 from fem_needle.cli.tables import new_table, show
-from fem_needle.errors import SceneError
 
 if TYPE_CHECKING:
     from fem_needle.scene import Scene
@@ -44,14 +43,11 @@ def new(
 
     Example: fem-needle new my-needle.toml
     """
+    from fem_needle.atomic_file import check_target, write_file
     from fem_needle.shipped import template_text
 
-    if file.exists() and not force:
-        raise SceneError(f"{file}: exists already; --force overwrites it")
-    try:
-        file.write_text(template_text(), encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise SceneError(f"{file}: cannot be written: {error}") from None
+    check_target(file, force=force)
+    write_file(file, template_text().encode())
     typer.echo(f"wrote {file}; try: fem-needle check {file}")
 
 
@@ -98,4 +94,4 @@ def schema() -> None:
     """
     from fem_needle.scene import Scene
 
-    typer.echo(json.dumps(Scene.model_json_schema(), indent=2, ensure_ascii=False))
+    print_json(Scene.model_json_schema())

@@ -34,11 +34,13 @@ def stress(
     for name, value, least in (("--scenes", scenes, 0), ("--seed", seed, 0), ("--processes", processes, 1)):
         if value is not None and value < least:
             raise SceneError(f"{name}: too few (got {value}; allowed from {least} on)")
-    from fem_needle.atomic_file import write_atomically
+    from fem_needle.atomic_file import check_target, write_file
     from fem_needle.cli.tables import new_table, show
     from fem_needle.progress_bar import ProgressBar
     from fem_needle.stress import stress as put_through
 
+    if out is not None:
+        check_target(out, force=True)
     bar = ProgressBar("scenes under stress")
     try:
         table = put_through(scenes, seed, long=long, processes=processes, progress=bar.progress)
@@ -49,7 +51,7 @@ def stress(
         shown.add_row(*row.cells())
     show(shown)
     if out is not None:
-        write_atomically(out, table.page().encode())
+        write_file(out, table.page().encode())
     _fail(table)
 
 

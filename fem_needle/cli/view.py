@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from pathlib import Path
@@ -39,6 +40,7 @@ def view(
 
     Example: fem-needle view runs/thesis --html thesis.html
     """
+    from fem_needle.atomic_file import check_target
     from fem_needle.cli.settings import number
     from fem_needle.run_folder import load_run
     from fem_needle.view import arrangement
@@ -46,14 +48,14 @@ def view(
     windowed = html is None and picture is None and _has_display()
     if html is None and picture is None and not windowed:
         picture = run / PICTURE
-        typer.echo("note: no display, so a picture in place of a window", err=True)
+        typer.echo("note: no display that answers, so a picture in place of a window", err=True)
     if picture is not None and picture.suffix.lower() != ".png":
         raise SceneError(f"--picture: is no PNG file by its name (got {picture.name!r}; allowed a name that ends in .png)")
     if picture is None and renderer != AUTO:
         raise SceneError(f"--renderer: has no effect without --picture (got {renderer!r})")
     for path in (html, picture):
-        if path is not None and path.exists() and not force:
-            raise SceneError(f"{path}: exists already (use --force to replace it)")
+        if path is not None:
+            check_target(path, force=force)
     arranged = arrangement(load_run(run), magnification)
     row = arranged.row(None if time is None else number("--time", time, "s"))
     if windowed:
@@ -67,7 +69,22 @@ def view(
 
 
 def _has_display() -> bool:
-    return sys.platform in {"win32", "darwin"} or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    """Return whether a window would open: VTK, which only talks to X, says nothing where the display does not answer."""
+    if sys.platform in {"win32", "darwin"}:
+        return True
+    return bool(os.environ.get("DISPLAY")) and _answers()
+
+
+def _answers() -> bool:
+    try:
+        library = ctypes.CDLL("libX11.so.6")
+    except OSError:
+        return False  # VTK needs it, too
+    library.XOpenDisplay.restype = ctypes.c_void_p
+    display = library.XOpenDisplay(None)
+    if display:
+        library.XCloseDisplay(ctypes.c_void_p(display))
+    return bool(display)
 
 
 def _write_page(arranged: Arrangement, row: int, path: Path) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from importlib.resources import files
+from multiprocessing import parent_process
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -35,6 +36,7 @@ _TABLE = types.Array(types.int64, 2, "C")
 _FUNCTIONS_SHARE = 0.75  # of the time goes into the functions, what is left into the whole that they become
 _SECONDS_PER_FUNCTION = 0.1
 _DIGITS = 12  # of what tells sources apart
+_TOLD: list[str] = []  # what was compiled and kept nowhere
 
 
 def inner(function: Callable[..., Any]) -> Any:
@@ -154,12 +156,22 @@ class _Counter(event.Listener):
     def on_start(self, event: event.Event) -> None:
         """Announce the first one."""
         if self._depth == 0:
-            notice.begun(
-                self._entrance.what,
-                round(_SECONDS_PER_FUNCTION * self._entrance.functions),
-                is_kept=self._entrance.folder is not None,
-            )
+            self._announce()
         self._depth += 1
+
+    def _announce(self) -> None:
+        """Say what is compiled; that it can be kept nowhere once, by the process that others were started from."""
+        what, seconds = self._entrance.what, round(_SECONDS_PER_FUNCTION * self._entrance.functions)
+        is_kept = self._entrance.folder is not None
+        if not is_kept and parent_process() is not None:
+            return
+        if is_kept or not _TOLD:
+            notice.begun(what, seconds, is_kept=is_kept)
+        else:
+            notice.LOGGER.warning("compiling the %s (some %d s)", what, seconds)
+            notice.done(what, 0.0)
+        if not is_kept:
+            _TOLD.append(what)
 
     def on_end(self, event: event.Event) -> None:
         """Count."""

@@ -7,9 +7,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from fem_needle.atomic_file import write_atomically
-from fem_needle.errors import ComputationError, SceneError
-from fem_needle.export import check_target
+from fem_needle.atomic_file import check_target, write_file
+from fem_needle.errors import SceneError
 from fem_needle.figures.animation import animated_gif
 from fem_needle.figures.course_figure import courses
 from fem_needle.figures.energy_figure import energies
@@ -75,14 +74,10 @@ def write_pictures(
     for target in targets:
         check_target(target, force=force)
     drawn = {kind: shapes(run, depths) if kind == "shapes" else _DRAWN[kind](run) for kind in dict.fromkeys(kinds)}
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, (kind, ending) in names.items():
-            write_atomically(folder / name, picture_bytes(drawn[kind], ending))
-        if animate:
-            write_atomically(folder / ANIMATION, animated_gif(run))
-    except OSError as error:
-        raise ComputationError(f"{folder}: pictures cannot be written: {error.strerror or error}") from error
+    for name, (kind, ending) in names.items():
+        write_file(folder / name, picture_bytes(drawn[kind], ending))
+    if animate:
+        write_file(folder / ANIMATION, animated_gif(run))
     return tuple(targets)
 
 

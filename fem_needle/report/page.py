@@ -13,8 +13,7 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from fem_needle.atomic_file import write_atomically
-from fem_needle.errors import ComputationError
+from fem_needle.atomic_file import write_file
 from fem_needle.report.parts import Chart, Page, Picture
 
 TEMPLATE, STYLE, SCRIPT = "page.html", "page.css", "page.js"
@@ -56,11 +55,7 @@ def write_report(page: Page, path: Path) -> None:
     ComputationError
         If the file cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, html_page(page).encode("utf-8", "replace"))
-    except OSError as error:
-        raise ComputationError(f"{path}: the report cannot be written: {error.strerror or error}") from error
+    write_file(path, html_page(page).encode("utf-8", "replace"))
 
 
 def _resource(name: str) -> str:

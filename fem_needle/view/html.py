@@ -11,7 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 import plotly.io
 
-from fem_needle.atomic_file import write_atomically
+from fem_needle.atomic_file import write_file
 from fem_needle.pictures import INK
 from fem_needle.view.arrangement import Arrangement, Pose
 from fem_needle.view.drawing import Part, layer_labels, lines, moving_parts, ruler_labels, still_parts, title_of
@@ -64,9 +64,14 @@ def write_html(arranged: Arrangement, path: Path, row: int | None = None) -> int
         File.
     row
         Sample that the page shows first; the last one by default.
+
+    Raises
+    ------
+    ComputationError
+        If the file cannot be written.
     """
     rows = shown_rows(len(arranged.run.time), row)
-    write_atomically(path, html_page(arranged, row).encode())
+    write_file(path, html_page(arranged, row).encode())
     return len(rows)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from fem_needle.atomic_file import write_atomically
+from fem_needle.atomic_file import write_file
 from fem_needle.errors import NeedleError
 from fem_needle.view.arrangement import Arrangement
 from fem_needle.view.by_matplotlib import picture
@@ -45,15 +45,17 @@ def write_picture(arranged: Arrangement, row: int, path: Path, renderer: Rendere
     ------
     NeedleError
         If VTK was asked for and cannot draw here.
+    ComputationError
+        If the file cannot be written.
     """
     drawn = drawing(arranged, row)
     content = None if renderer is Renderer.MATPLOTLIB else _by_vtk(drawn)
     if content is not None:
-        write_atomically(path, content)
+        write_file(path, content)
         return Renderer.VTK
     if renderer is Renderer.VTK:
         raise NeedleError("--renderer: VTK cannot draw here: it finds no GL (allowed auto, matplotlib)")
-    write_atomically(path, picture(drawn))
+    write_file(path, picture(drawn))
     return Renderer.MATPLOTLIB
 
 

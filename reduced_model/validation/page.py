@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from fem_needle.atomic_file import write_atomically
-from fem_needle.errors import SceneError
+from fem_needle.atomic_file import write_file
 from reduced_model.validation import energy, insertion, released, signs, thesis_at_rest, transients, tube_at_rest
-from reduced_model.validation.section import Section, prose
+from reduced_model.validation.section import Section
 
 AT_REST: dict[str, Callable[[], Section]] = {
     "thesis": thesis_at_rest.section,
@@ -55,7 +54,7 @@ def write_page(file: Path, found: list[Section], *, quick: bool = False) -> tupl
 
     Raises
     ------
-    SceneError
+    ComputationError
         If it cannot be written.
     """
     return write_files(file, page(found, quick=quick), found)
@@ -66,17 +65,13 @@ def write_files(file: Path, text: str, found: list[Section]) -> tuple[Path, ...]
 
     Raises
     ------
-    SceneError
+    ComputationError
         If it cannot be written.
     """
     folder = file.parent / "pictures"
     contents = {file: text.encode()}
     for section in found:
         contents |= {folder / name: draw() for name, draw in section.pictures.items()}
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for path, content in contents.items():
-            write_atomically(path, content)
-    except OSError as error:
-        raise SceneError(prose(f"--out: {file} cannot be written: {error}")) from None
+    for path, content in contents.items():
+        write_file(path, content)
     return tuple(contents)

@@ -247,7 +247,7 @@ def view(command_line, arranged, monkeypatch, tmp_path):
 def test_without_a_display_a_picture_is_left_in_the_run(view, tmp_path):
     status, out, err = view("--renderer", "matplotlib")
     assert status == 0 and "wrote run/view.png" in out
-    assert "note: no display, so a picture in place of a window" in err
+    assert "note: no display that answers, so a picture in place of a window" in err
     assert view("--renderer", "matplotlib")[0] == 2
     assert view("--renderer", "matplotlib", "--force")[0] == 0
 
@@ -276,6 +276,7 @@ def test_mistakes(view, arguments, message):
 def test_a_display_gets_a_window(view, monkeypatch):
     shown = []
     monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr("fem_needle.cli.view._answers", lambda: True)
     monkeypatch.setattr("fem_needle.view.by_vtk.show", lambda arranged, row: shown.append(row))
     assert view("--time", "0.3")[0] == 0
     assert shown == [3]
