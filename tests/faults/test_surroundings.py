@@ -51,7 +51,7 @@ def placed(arguments, folder, place):
 
 
 @pytest.mark.parametrize("arguments", WRITERS.values(), ids=WRITERS)
-def test_a_file_in_place_of_a_folder_is_refused_before_anything_is_computed(command_line, folder, tmp_path, monkeypatch, arguments):
+def test_a_file_in_place_of_a_folder_is_refused_first(command_line, folder, tmp_path, monkeypatch, arguments):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     status, out, err = command_line(*placed(arguments, folder, "file"))

@@ -50,10 +50,11 @@ def test_new_overwrites_only_with_force(run, tmp_path):
 
 
 def test_new_into_a_folder_that_is_not_there(run, tmp_path):
-    status, _, err = run("new", str(tmp_path / "none" / "mine.toml"))
-    assert status == 2
-    assert "cannot be written" in err
-    assert "Traceback" not in err
+    """It is made, as every folder that a command writes into; a file in its place is told."""
+    assert run("new", str(tmp_path / "none" / "mine.toml"))[0] == 0
+    assert (tmp_path / "none" / "mine.toml").is_file()
+    status, _, err = run("new", str(tmp_path / "none" / "mine.toml" / "other.toml"))
+    assert (status, "cannot be written" in err, "Traceback" in err) == (2, True, False)
 
 
 def test_check_shows_si_and_millimeters(run):

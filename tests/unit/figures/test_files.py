@@ -130,6 +130,6 @@ def test_a_full_disk_is_told(folder, monkeypatch):
     def full(path, content):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("fem_needle.figures.files.write_atomically", full)
+    monkeypatch.setattr("fem_needle.atomic_file.write_atomically", full)
     with pytest.raises(ComputationError, match=r"cannot be written: No space left on device"):
         write_pictures(run_named("hold"), folder, ["tip-path"])

@@ -24,6 +24,7 @@ from fem_needle.figures.animation import animated_gif
 from fem_needle.identification.picture import identification_picture
 from fem_needle.identification.sample_data import sample_path
 from fem_needle.pictures import FORMATS, picture_bytes
+from fem_needle.run_folder import save_run
 from fem_needle.view import arrangement
 from fem_needle.view.by_matplotlib import picture
 from fem_needle.view.drawing import drawing
@@ -121,7 +122,7 @@ def test_bytes_do_not_depend_on_settings(made, draw):
 
 
 def test_a_file_of_settings_and_an_unknown_backend(tmp_path, made):
-    made("steer").save(tmp_path / "run", vtk=False)
+    save_run(made("steer"), tmp_path / "run", vtk=False)
     settings = tmp_path / "matplotlibrc"
     settings.write_text("text.usetex: True\nfont.size: 31\nfont.family: none such\nno.such.key: 1\nsavefig.bbox: tight\n")
     written = []

@@ -304,5 +304,5 @@ def test_damaged_summaries_are_refused(folder, tmp_path, text, said):
 
 def test_a_report_that_cannot_be_written_says_so(page, tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(ComputationError, match="report.html: cannot be written"):
+    with pytest.raises(ComputationError, match=r"report\.html: cannot be written"):
         write_report(page, tmp_path / "file" / "report.html")

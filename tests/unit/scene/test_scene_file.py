@@ -169,7 +169,7 @@ def test_shipped_scenes_load_and_name_the_source_of_every_number(name):
 def test_all_scenes_of_the_contract_are_shipped():
     expected = "thesis brachytherapy release bench-s bench-d bench-m bench-m2 misra-2010 roesthuis-2012 abayazid-2013"
     expected += " thesis-open-loop liver-push thesis-pid thesis-inverse-dynamics steering steering-manual steering-stiff"
-    expected += " friction-ramp three-layers"
+    expected += " friction-ramp three-layers bevel"
     assert set(shipped.shipped_names()) == set(expected.split())
     assert all(scene.title for scene in shipped.shipped_scenes())
 
