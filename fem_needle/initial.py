@@ -13,7 +13,7 @@ from fem_needle.motion import DepthLaw
 from fem_needle.path import straight_path
 from fem_needle.plant import Plant
 from fem_needle.stages import Stage, StageSolution, evaluate_stage, momentum, trivial_solution, with_path
-from fem_needle.statics import derivative_of, equilibrium_of, static_state
+from fem_needle.statics import Statics
 
 Array = NDArray[np.float64]
 
@@ -50,23 +50,26 @@ def _initial_solution(plant: Plant, law: DepthLaw, stage: Stage) -> StageSolutio
 
 
 def _moving_equilibrium(plant: Plant, law: DepthLaw, stage: Stage) -> StageSolution:
-    there = stage.operators, stage.points
-    rest = equilibrium_of(plant, *there, stage.case, depth=law.depth(0.0), time=0.0)
+    statics = _statics(plant, stage)
+    rest = statics.equilibrium(stage.case)
     velocities = np.zeros(plant.size)
     if stage.instant.speed:
-        velocities = stage.instant.speed * derivative_of(plant, rest, *there)[0]
+        velocities = stage.instant.speed * statics.derivative(rest)[0]
     start = momentum(stage, rest.coordinates, velocities)
     return StageSolution(rest.coordinates, velocities, start, rest.point_forces)
+
+
+def _statics(plant: Plant, stage: Stage) -> Statics:
+    return Statics(plant, stage.instant.depth, stage.instant.time, stage.operators, stage.points)
 
 
 def _tip_displaced(plant: Plant, stage: Stage, tip_deflection: float) -> tuple[Array, Array]:
     """Return the clamp's own static shape plus that of a tip force, scaled to the wanted tip, and the guides' forces in it."""
     forces = np.zeros_like(stage.case.forces)
-    still = np.zeros(2)
+    still, statics = np.zeros(2), _statics(plant, stage)
 
     def shape(case: LoadCase) -> tuple[Array, Array]:
-        instant = stage.instant
-        coordinates, found = static_state(plant, stage.operators, stage.points, case, depth=instant.depth, time=instant.time)
+        coordinates, found = statics.state(case)
         return coordinates, found[: stage.points.guides]
 
     clamped, held = shape(replace(stage.case, forces=forces))

@@ -8,7 +8,7 @@ import numpy as np
 
 from fem_needle.loads import load_case
 from fem_needle.plant import Plant
-from fem_needle.statics import static_state
+from fem_needle.statics import statics_at
 
 _NUDGES = (1, 2, 3, 5, 8, 13)  # units in which the depth is moved to see the round-off
 _NUDGE = 2.0**-50
@@ -28,9 +28,10 @@ def round_off(plant: Plant, depth: float, time: float, *, stepped: bool) -> floa
 
 def _tip_compliance(plant: Plant, depth: float, time: float, *, stepped: bool) -> float:
     """Return the tip's deflection under a tip force of 1 N and nothing else [m]."""
-    operators, points, case = plant.operators(depth, time), plant.points(depth), load_case(plant.scene, depth, time)
-    operators = replace(operators, beam=None) if stepped else operators
+    statics, case = statics_at(plant, depth, time), load_case(plant.scene, depth, time)
+    if stepped:
+        statics = replace(statics, operators=replace(statics.operators, beam=None))
     forces = np.zeros_like(case.forces)
     forces[-1] = 1.0
     alone = replace(case, forces=forces, clamp=np.zeros_like(case.clamp))
-    return float(points.rows[-1] @ static_state(plant, operators, points, alone, depth=depth, time=time)[0])
+    return float(statics.points.rows[-1] @ statics.state(alone)[0])

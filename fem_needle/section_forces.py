@@ -9,6 +9,7 @@ moment at a free tip (docs/theory.md, "Section forces").
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,8 @@ from fem_needle.path import CutPath
 from fem_needle.plant import Plant
 from fem_needle.row_blocks import row_blocks
 from fem_needle.sample_arrays import Samples
-from fem_needle.scene import as_function
+from fem_needle.scene import Scene, as_function
+from fem_needle.segments import tip_values
 from fem_needle.shapes import values_at
 
 Array = NDArray[np.float64]
@@ -53,14 +55,19 @@ def section_forces(plant: Plant, samples: Samples, arc_length: Array) -> Section
     the derivatives of its deflection.
     """
     if not is_known(plant):
-        state, stiffness = (samples.coordinates, samples.point_forces, samples.depth), plant.scene.needle.bending_stiffness
-        return SectionForces(*(stiffness * plant.deflection(*state, arc_length, derivative) for derivative in (2, 3)))
+        state = samples.coordinates, samples.point_forces, samples.depth
+        return differentiated(plant.scene, lambda derivative: plant.deflection(*state, arc_length, derivative))
     shape = (len(samples), arc_length.size)
     found, loads = SectionForces(np.zeros(shape), np.zeros(shape)), _LineLoads(plant)
     for rows in row_blocks(shape[0], GAUSS_POINTS * (shape[1] + len(plant.shapes.breaks))):
         block = loads.sections(samples.rows(rows), arc_length)
         found.bending_moment[rows], found.shear_force[rows] = block.bending_moment, block.shear_force
     return found
+
+
+def differentiated(scene: Scene, deflection: Callable[[int], Array]) -> SectionForces:
+    """Return EI times the second and third derivatives of a deflection, where nothing better is known."""
+    return SectionForces(*(scene.needle.bending_stiffness * deflection(derivative) for derivative in (2, 3)))
 
 
 class _LineLoads:
@@ -142,11 +149,8 @@ class _LineLoads:
     def _layers(self, samples: Samples, y: Array) -> tuple[Array, Array]:
         """Return m(t) k and c at positions (T, ...)."""
         factor = as_function(self.scene.tissue.stiffness_factor).value(samples.time)
-        modulus, damping = np.zeros(y.shape), np.zeros(y.shape)
-        for layer in self.scene.tissue.layers:
-            inside = (y >= layer.start) & (y < layer.far_side)
-            modulus[inside], damping[inside] = layer.foundation_modulus, layer.damping
-        return modulus * factor[:, None], damping
+        modulus = tip_values(self.scene.tissue.layers, y, lambda layer: layer.foundation_modulus)
+        return modulus * factor[:, None], tip_values(self.scene.tissue.layers, y, lambda layer: layer.damping)
 
     def _acceleration(self, samples: Samples, field: _Field, speed: Array) -> Array:
         """Return D^2w/Dt^2 [m/s^2]; of a fixed-frame needle the second derivative at a fixed y."""

@@ -99,8 +99,12 @@ def solve_static(plant: Plant, *, depth: float, time: float = 0.0, path: CutPath
     case = load_case(plant.scene, depth, time)
     if depth < plant.smallest_depth:
         return _straight(plant, depth, time, case)
-    there = plant.operators(depth, time), plant.points(depth)
-    return equilibrium_of(plant, *there, case, depth=depth, time=time, rest=rest_of(plant, path, depth, time))
+    return statics_at(plant, depth, time, path).equilibrium(case)
+
+
+def statics_at(plant: Plant, depth: float, time: float, path: CutPath | None = None) -> Statics:
+    """Return the statics of a plant at a depth [m] and time [s], on a path or on a straight line."""
+    return Statics(plant, depth, time, plant.operators(depth, time), plant.points(depth), rest_of(plant, path, depth, time))
 
 
 def rest_of(plant: Plant, path: CutPath | None, depth: float, time: float) -> RestTerms | None:
@@ -112,72 +116,90 @@ def rest_of(plant: Plant, path: CutPath | None, depth: float, time: float) -> Re
     return RestTerms(*(factor * getattr(terms, part.name) for part in fields(RestTerms)))
 
 
-def equilibrium_of(
-    plant: Plant,
-    operators: Operators,
-    points: Points,
-    case: LoadCase,
-    *,
-    depth: float,
-    time: float,
-    rest: RestTerms | None = None,
-) -> Equilibrium:
-    """Return the equilibrium of matrices that are there already; errors as in `solve_static`."""
-    pulled = None if rest is None else rest.load
-    state = _supported_state(plant, operators, points, case, depth=depth, time=time, rest_load=pulled)
-    rounding = 0.0
-    if operators.beam is None:
-        rounding = ROUNDING * float(np.max(np.abs(operators.stiffness)) * np.max(np.abs(state[0])))
-    return check_force_sum(_equilibrium(plant, depth, time, operators, *state, rest_load=pulled), points, rounding)
-
-
-def static_state(
-    plant: Plant,
-    operators: Operators,
-    points: Points,
-    case: LoadCase,
-    *,
-    depth: float,
-    time: float,
-    rest_load: Array | None = None,
-) -> tuple[Array, Array]:
-    """Return coordinates and point forces of the equilibrium under a load case; depth and time are for messages.
-
-    ``rest_load``: of a path on which the tissue rests, m H.
-    """
-    return _supported_state(plant, operators, points, case, depth=depth, time=time, rest_load=rest_load)[:2]
-
-
 def no_load_case(case: LoadCase) -> LoadCase:
     """Return a case of the same size without loads, the clamp straight."""
     return LoadCase(*(np.zeros_like(getattr(case, part.name)) for part in fields(LoadCase)))
 
 
-def _supported_state(
-    plant: Plant,
-    operators: Operators,
-    points: Points,
-    case: LoadCase,
-    *,
-    depth: float,
-    time: float,
-    rest_load: Array | None,
-) -> tuple[Array, Array, Array]:
-    """Return coordinates, point forces and what the clamped coordinates' equations lack."""
-    guides, known = points.guides, known_coordinates(plant, case)
-    resisted = banded.multiply(operators.tissue, known)  # a straight needle has no bending
-    if rest_load is not None:
-        resisted = resisted - rest_load
-    force = points.rows[guides:].T @ case.forces - resisted
-    gap = points.rows[:guides] @ known + points.flexibility[:guides, guides:] @ case.forces
-    try:
-        free, guide_forces, support = _solve_supported(plant, operators, points, force, gap)
-    except (banded.SingularMatrixError, np.linalg.LinAlgError) as error:
-        raise ComputationError(
-            f"no static solution at time {time:g} s, depth {depth:g} m: {error}; check stiffnesses and use fewer elements"
-        ) from error
-    forces, clamped = np.concatenate([guide_forces, case.forces]), plant.prescribed
-    return known + free, forces, support + resisted[:clamped] - points.rows[:, :clamped].T @ forces
+@dataclass(frozen=True, eq=False)
+class Statics:
+    """The equations of a plant at rest, K q = N.P + m H, for any loads.
+
+    Attributes
+    ----------
+    plant
+        The model.
+    depth, time
+        Where and when [m], [s].
+    operators, points
+        Of the plant there.
+    rest
+        Of the path on which the tissue rests, the stiffness factor included; None: a straight line.
+    """
+
+    plant: Plant
+    depth: float
+    time: float
+    operators: Operators
+    points: Points
+    rest: RestTerms | None = None
+
+    def state(self, case: LoadCase) -> tuple[Array, Array]:
+        """Return coordinates and point forces under a load case.
+
+        Raises
+        ------
+        ComputationError
+            If the equations have no solution.
+        """
+        return self._supported(case)[:2]
+
+    def tip(self, case: LoadCase) -> float:
+        """Return the tip's deflection [m] under a load case; errors as of `state`."""
+        return float(self.points.deflections(*self.state(case))[-1])
+
+    def equilibrium(self, case: LoadCase) -> Equilibrium:
+        """Return the equilibrium under a load case; errors as of `solve_static`."""
+        coordinates, forces, support = self._supported(case)
+        hub_force, hub_moment = self.plant.clamp_reactions(support, self.depth)
+        tissue = -float(self.plant.deflection_at_one @ self._resisted(coordinates))
+        held = forces[: self.points.guides]
+        rest = Equilibrium(self.plant, self.depth, self.time, coordinates, forces, held, hub_force, hub_moment, tissue)
+        rounding = 0.0
+        if self.operators.beam is None:
+            rounding = ROUNDING * float(np.max(np.abs(self.operators.stiffness)) * np.max(np.abs(coordinates)))
+        return check_force_sum(rest, self.points, rounding)
+
+    def derivative(self, rest: Equilibrium) -> tuple[Array, Array]:
+        """Return what `depth_derivative` does."""
+        points, moved = self.points, self.plant.stiffness_rate_product(rest.coordinates, self.depth, self.time)
+        if self.rest is not None:
+            moved = moved - self.rest.load_rate
+        guides, force = points.guides, points.row_rates.T @ rest.point_forces - moved
+        drift = points.row_rates[:guides] @ rest.coordinates + points.flexibility_rate[:guides] @ rest.point_forces
+        return solve_guided(self.plant, self.operators, points, force, drift)
+
+    def _resisted(self, coordinates: Array) -> Array:
+        """Return m G q - m H."""
+        resisted = banded.multiply(self.operators.tissue, coordinates)
+        return resisted if self.rest is None else resisted - self.rest.load
+
+    def _supported(self, case: LoadCase) -> tuple[Array, Array, Array]:
+        """Return also what the clamped coordinates' equations lack."""
+        points, plant = self.points, self.plant
+        guides, known = points.guides, known_coordinates(plant, case)
+        resisted = self._resisted(known)  # a straight needle has no bending
+        force = points.rows[guides:].T @ case.forces - resisted
+        gap = points.rows[:guides] @ known + points.flexibility[:guides, guides:] @ case.forces
+        try:
+            free, guide_forces, support = _solve_supported(plant, self.operators, points, force, gap)
+        except (banded.SingularMatrixError, np.linalg.LinAlgError) as error:
+            raise ComputationError(
+                f"no static solution at time {self.time:g} s, depth {self.depth:g} m: {error}; "
+                "check stiffnesses and use fewer elements"
+            ) from error
+        forces, clamped = np.concatenate([guide_forces, case.forces]), plant.prescribed
+        return known + free, forces, support + resisted[:clamped] - points.rows[:, :clamped].T @ forces
 
 
 def known_coordinates(plant: Plant, case: LoadCase) -> Array:
@@ -213,35 +235,6 @@ def _solve_supported(
     return result, reactions, support[:, 0] + support[:, 1:] @ reactions
 
 
-def _equilibrium(
-    plant: Plant,
-    depth: float,
-    time: float,
-    operators: Operators,
-    coordinates: Array,
-    forces: Array,
-    support: Array,
-    *,
-    rest_load: Array | None,
-) -> Equilibrium:
-    """Collect a static state and the reactions that follow from it."""
-    hub_force, hub_moment = plant.clamp_reactions(support, depth)
-    guides = len(plant.scene.support.guides)
-    resisted = banded.multiply(operators.tissue, coordinates)
-    tissue = -plant.deflection_at_one @ (resisted if rest_load is None else resisted - rest_load)
-    return Equilibrium(
-        plant,
-        depth,
-        time,
-        coordinates,
-        forces,
-        forces[:guides],
-        hub_force,
-        hub_moment,
-        float(tissue),
-    )
-
-
 def check_force_sum(rest: Equilibrium, points: Points, rounding: float = 0.0) -> Equilibrium:
     """Return the state if support, guides, loads and tissue balance.
 
@@ -271,21 +264,7 @@ def depth_derivative(plant: Plant, rest: Equilibrium, path: CutPath | None = Non
     """
     if rest.depth < plant.smallest_depth:
         return np.zeros(plant.size), np.zeros(0)
-    there = plant.operators(rest.depth, rest.time), plant.points(rest.depth)
-    return derivative_of(plant, rest, *there, rest_of(plant, path, rest.depth, rest.time))
-
-
-def derivative_of(
-    plant: Plant, rest: Equilibrium, operators: Operators, points: Points, terms: RestTerms | None = None
-) -> tuple[Array, Array]:
-    """Return what `depth_derivative` does, of matrices that are there already."""
-    moved = plant.stiffness_rate_product(rest.coordinates, rest.depth, rest.time)
-    if terms is not None:
-        moved = moved - terms.load_rate
-    force = points.row_rates.T @ rest.point_forces - moved
-    guides = points.guides
-    drift = points.row_rates[:guides] @ rest.coordinates + points.flexibility_rate[:guides] @ rest.point_forces
-    return solve_guided(plant, operators, points, force, drift)
+    return statics_at(plant, rest.depth, rest.time, path).derivative(rest)
 
 
 def _straight(plant: Plant, depth: float, time: float, case: LoadCase) -> Equilibrium:

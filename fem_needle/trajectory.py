@@ -17,7 +17,7 @@ from fem_needle.motion import wanted_radius
 from fem_needle.plant import Plant
 from fem_needle.sample_arrays import PATH, Samples
 from fem_needle.scene import Scene, as_function
-from fem_needle.section_forces import SectionForces, section_forces
+from fem_needle.section_forces import SectionForces, differentiated, section_forces
 from fem_needle.time_integrals import twice_integrated
 
 Array = NDArray[np.float64]
@@ -183,8 +183,7 @@ class Trajectory(Shown):
             return self.stored_sections
         if self.plant is not None and self.samples is not None:
             return section_forces(self.plant, self.samples, self.arc_length)
-        stiffness = self.scene.needle.bending_stiffness
-        return SectionForces(*(stiffness * self.deflection(derivative=derivative) for derivative in (2, 3)))
+        return differentiated(self.scene, lambda derivative: self.deflection(derivative=derivative))
 
     @property
     def bending_moment(self) -> Array:

@@ -184,9 +184,9 @@ def snapshot_basis(needle: FiniteElementNeedle, run: Trajectory, modes: int, dep
         If the run is of another plant, or has fewer independent shapes.
     """
     clamped = needle.prescribed
-    if run.samples.coordinates.shape[1] != needle.size:
-        raise SceneError(f"run: has {run.samples.coordinates.shape[1]} coordinates (allowed {needle.size}, those of the needle)")
-    shapes = run.samples.coordinates[:, clamped:]
+    if run.coordinates.shape[1] != needle.size:
+        raise SceneError(f"run: has {run.coordinates.shape[1]} coordinates (allowed {needle.size}, those of the needle)")
+    shapes = run.coordinates[:, clamped:]
     bending = banded.to_dense(banded.trailing(needle.operators(depth, 0.0).bending, clamped))
     factor = np.linalg.cholesky(bending)
     left, values, _ = np.linalg.svd(factor.T @ shapes.T, full_matrices=False)

@@ -22,7 +22,7 @@ from fem_needle.gauss import gauss_rule
 from fem_needle.loads import LoadCase, load_case
 from fem_needle.plant import Plant
 from fem_needle.scene import Constant, Scene, as_function
-from fem_needle.statics import static_state
+from fem_needle.statics import statics_at
 from reduced_model.clamped_solutions import ClampedSolutions
 from reduced_model.shapes import GAUSS_POINTS, FunctionSet, ModeSet
 
@@ -181,9 +181,9 @@ def _depth_range(scene: Scene) -> tuple[float, float]:
 
 
 def _unit_responses(plant: FiniteElementNeedle, depth: float, time: float, stretch: float) -> Iterator[FunctionSet]:
-    operators, points = plant.operators(depth, time), plant.points(depth)
+    statics = statics_at(plant, depth, time)
     for case in _unit_cases(plant, load_case(plant.scene, depth, time)):
-        coordinates, forces = static_state(plant, operators, points, case, depth=depth, time=time)
+        coordinates, forces = statics.state(case)
         clamp = coordinates[:2]  # a hub that turns has an angle of its own
         yield Response(plant, depth, coordinates - plant.straight(float(clamp[0]), float(clamp[1])), forces, stretch)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,11 +14,11 @@ from fem_needle.linear.linearization import lateral_inputs, linearize, reach
 from fem_needle.linear.modal_form import lateral_frequencies
 from fem_needle.linear.model import Signal
 from fem_needle.linear.slow_cut import slow_cut
-from fem_needle.loads import LoadCase
+from fem_needle.loads import LoadCase, load_case
 from fem_needle.path import CutPath
 from fem_needle.plant import Plant
 from fem_needle.scene import Scene
-from fem_needle.statics import depth_derivative, solve_static, static_state
+from fem_needle.statics import statics_at
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,9 @@ class DepthGains:
     sign_changes: tuple[SignChange, ...]
 
 
-def depth_gains(plant: Plant, depths: ArrayLike | None = None, *, time: float = 0.0) -> DepthGains:
+def depth_gains(
+    plant: Plant, depths: ArrayLike | None = None, *, time: float = 0.0, path: CutPath | None = None
+) -> DepthGains:
     """Return gains and frequencies over the depth, and where gains change sign.
 
     Parameters
@@ -75,6 +77,8 @@ def depth_gains(plant: Plant, depths: ArrayLike | None = None, *, time: float = 
         [m], rising; default: 181 from 1 % of the length to 2 % before the hub meets skin, guide or lateral load.
     time
         Instant [s] whose loads (for ``depth``) and stiffness factor act.
+    path
+        That the tip has cut at the last depth; default: by a slow insertion, where tissue rests on the cut path.
 
     Raises
     ------
@@ -92,7 +96,7 @@ def depth_gains(plant: Plant, depths: ArrayLike | None = None, *, time: float = 
     if np.any(places <= least) or np.any(places > length) or np.any(np.diff(places) <= 0.0):
         raise SceneError(f"depths: out of range (got {places.tolist()}; allowed rising, above {least:g} to {length:g} m)")
     inputs = (*lateral_inputs(plant), Signal("depth", "m"))
-    path = slow_cut(plant, float(places[-1]), time)
+    path = slow_cut(plant, float(places[-1]), time) if path is None else path
     gains = np.array([tip_gains(plant, float(depth), time, path) for depth in places])
     frequencies = np.array([_frequencies(plant, float(depth), time, path) for depth in places])
     names = [(index, one.name) for index, one in enumerate(inputs)]
@@ -129,7 +133,9 @@ def tip_gains(plant: Plant, depth: float, time: float = 0.0, path: CutPath | Non
     ComputationError
         If there is no equilibrium.
     """
-    operators, points = plant.operators(depth, time), plant.points(depth)
+    here = slow_cut(plant, depth, time) if path is None else path.up_to(depth)
+    resting = statics_at(plant, depth, time, here)
+    frozen, points = replace(resting, rest=None), resting.points  # what a load does, it does alone
     forces = len(points.rows) - points.guides
     given = plant.prescribed if plant.scene.support.kind == "hub" else 0
     gains = []
@@ -138,11 +144,9 @@ def tip_gains(plant: Plant, depth: float, time: float = 0.0, path: CutPath | Non
         clamp[:given] = unit[forces:]
         none = np.zeros_like
         case = LoadCase(unit[:forces], none(unit[:forces]), clamp, none(clamp), none(clamp))
-        state = static_state(plant, operators, points, case, depth=depth, time=time)
-        gains.append(float(points.deflections(*state)[-1]))
-    here = slow_cut(plant, depth, time) if path is None else path.up_to(depth)
-    rest = solve_static(plant, depth=depth, time=time, path=here)
-    moved, _ = depth_derivative(plant, rest, here)
+        gains.append(frozen.tip(case))
+    rest = resting.equilibrium(load_case(plant.scene, depth, time))
+    moved, _ = resting.derivative(rest)
     return np.array([*gains, float(points.rows[-1] @ moved + points.row_rates[-1] @ rest.coordinates)])
 
 

@@ -241,7 +241,7 @@ def _analyzed(plant: Plant, model: LinearModel) -> DepthAnalysis:
     coordinates = len(model.states) // 2 - sum(signal.name in AXIAL for signal in model.states)
     slow = modal(model, SLOWEST) if coordinates > SLOWEST else model
     point = model.operating_point
-    held = depth_gains(plant, [point.depth], time=point.time)
+    held = depth_gains(plant, [point.depth], time=point.time, path=point.path)
     gains = {signal.name: float(gain) for signal, gain in zip(held.inputs, held.gains[0], strict=True)}
     return DepthAnalysis(model, slow, gains, tuple(_verdicts(slow)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,7 +22,7 @@ from fem_needle.plant import Plant
 from fem_needle.scene import Scene, TipLoad
 from fem_needle.scene.cross_checks import input_obstacle
 from fem_needle.segments import interfaces
-from fem_needle.statics import rest_of, static_state
+from fem_needle.statics import statics_at
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class DepthCurve:
 class ModelResponse:
     """Static response of a model's tip to one input; loads, hub and stiffness factor of t = 0.
 
-    Springs rest on the straight line, or on the path that a slow insertion cuts without the input.
+    Springs rest on the straight line, or on the path that a slow insertion cuts under these loads.
 
     Attributes
     ----------
@@ -193,15 +193,8 @@ def _piece(plant: Plant, index: int, name: str, ends: tuple[float, float], path:
     cases = [_still(case, loads) for loads in (unit, acting)]
 
     def answer(depth: float) -> tuple[float, float]:
-        operators, points = plant.operators(depth, 0.0), plant.points(depth)
-        terms = rest_of(plant, None if path is None else path.up_to(depth), depth, 0.0)
-        pulls = None, None if terms is None else terms.load  # what the input does, it does on a frozen path
-        states = [
-            static_state(plant, operators, points, loads, depth=depth, time=0.0, rest_load=pull)
-            for loads, pull in zip(cases, pulls, strict=True)
-        ]
-        gain, rest = (float(points.deflections(*state)[-1]) for state in states)
-        return gain, rest
+        resting = statics_at(plant, depth, 0.0, None if path is None else path.up_to(depth))
+        return replace(resting, rest=None).tip(cases[0]), resting.tip(cases[1])
 
     return _Piece(*ends, answer)
 

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from fem_needle.dynamics.arrays import floats_2
 from fem_needle.dynamics.compilation import inner
 from fem_needle.dynamics.dense import solve_small
-from fem_needle.dynamics.names import GUIDES, PRESCRIBED
+from fem_needle.dynamics.names import GUIDES, METHOD, PLACES, PRESCRIBED
+
+
+@inner
+def ends_at_node(arrays, count):
+    """Return whether the last of ``count`` nodes is the end of a step: guides' multipliers there are the solution's own."""
+    return floats_2(arrays, METHOD)[PLACES, count - 1] == 1.0
 
 
 @inner

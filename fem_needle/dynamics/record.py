@@ -8,6 +8,7 @@ from fem_needle.dynamics.axial import cutting_force, friction_force
 from fem_needle.dynamics.compilation import inner
 from fem_needle.dynamics.energy import bending_energy, kinetic_energy, tissue_energy
 from fem_needle.dynamics.forces import add_tissue_forces, clamp_forces
+from fem_needle.dynamics.guides import ends_at_node
 from fem_needle.dynamics.points import along
 from fem_needle.dynamics.works import reached
 
@@ -109,10 +110,9 @@ def keep_output(arrays, at, count, h, deepest, row):
         row[ix.RECORD + i] = q[i]
     for point in range(points):
         row[ix.RECORD + n + point] = forces[at, point]
-    ends_at_node = floats_2(arrays, ix.METHOD)[ix.PLACES, count - 1] == 1.0
     for guide in range(guides):  # of a rigid guide the mean over the step, about which its multiplier alternates
         shown = forces[at, guide]
-        if switches[ix.INERTIA] and compliance[guide] == 0.0 and not ends_at_node:
+        if switches[ix.INERTIA] and compliance[guide] == 0.0 and not ends_at_node(arrays, count):
             shown = 0.0
             for node in range(count):
                 shown += weights[node] * forces[node, guide]

@@ -21,7 +21,7 @@ from fem_needle.dynamics.cut_path import (
 )
 from fem_needle.dynamics.energy import axial_momentum
 from fem_needle.dynamics.forces import add_momentum
-from fem_needle.dynamics.guides import soft_reactions
+from fem_needle.dynamics.guides import ends_at_node, soft_reactions
 from fem_needle.dynamics.instant import beam_at, set_motion, set_place
 from fem_needle.dynamics.points import along
 from fem_needle.dynamics.reduced import factor_mass, solve_mass
@@ -114,14 +114,13 @@ def set_end_forces(arrays, count):
     Else rigid guides keep their mean over the step, about which their multipliers alternate.
     """
     switches, forces, held = integers_1(arrays, ix.SWITCH), floats_2(arrays, ix.FORCES), floats_1(arrays, ix.HELD)
-    guides, method = switches[ix.GUIDES], floats_2(arrays, ix.METHOD)
-    ends_at_node = method[ix.PLACES, count - 1] == 1.0
+    guides, weights, is_node = switches[ix.GUIDES], floats_2(arrays, ix.METHOD)[ix.WEIGHTS], ends_at_node(arrays, count)
     for guide in range(guides):
         forces[ix.END, guide] = 0.0
         for node in range(count):
-            share = (1.0 if node == count - 1 else 0.0) if ends_at_node else method[ix.WEIGHTS, node]
+            share = (1.0 if node == count - 1 else 0.0) if is_node else weights[node]
             forces[ix.END, guide] += share * forces[node, guide]
-    if guides and not ends_at_node:
+    if guides and not is_node:
         soft_reactions(
             switches, floats_1(arrays, ix.NUMBER)[ix.SOFTEST], floats_3(arrays, ix.POINT_ROWS)[ix.END],
             integers_2(arrays, ix.POINT_FIRST)[ix.END], floats_3(arrays, ix.FLEXIBLE)[ix.END], floats_1(arrays, ix.COMPLIANCE),

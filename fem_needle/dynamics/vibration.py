@@ -23,7 +23,7 @@ from fem_needle.plant import Plant
 from fem_needle.sample_arrays import NO_PATH, SINCE_START, Samples
 from fem_needle.scene import Scene
 from fem_needle.stages import StageSolution, evaluate_stage
-from fem_needle.statics import static_state
+from fem_needle.statics import Statics
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class Vibration:
     def _rest(self) -> Array:
         stage = self.origin.stage
         depth, time = stage.instant.depth, stage.instant.time
-        return static_state(self.plant, stage.operators, stage.points, stage.case, depth=depth, time=time)[0]
+        return Statics(self.plant, depth, time, stage.operators, stage.points).state(stage.case)[0]
 
     @cached_property
     def _modes(self) -> tuple[Array, Array, Array, Array]:

@@ -23,7 +23,7 @@ from fem_needle.loads import LoadCase, load_case
 from fem_needle.models import build_plant
 from fem_needle.plant import Operators, Points
 from fem_needle.scene import LateralLoad, Scene, TipLoad, as_function
-from fem_needle.statics import known_coordinates, solve_guided, static_state
+from fem_needle.statics import Statics, known_coordinates, solve_guided
 
 Array = NDArray[np.float64]
 
@@ -165,9 +165,7 @@ class StaticProblem:
 
     def _answer(self, first: _Instant, changes: Sequence[_Change], values: Array) -> tuple[Array, Array]:
         at, place = _moved_instant(first, changes, values - self.start), first.place
-        coordinates, forces = static_state(
-            self.plant, at.operators, at.points, at.case, depth=place.depth, time=place.time
-        )
+        coordinates, forces = Statics(self.plant, place.depth, place.time, at.operators, at.points).state(at.case)
         slopes = [self._slope(at, change, coordinates, forces) for change in changes]
         return self._seen(at, coordinates, forces), np.stack(slopes, axis=1)
 

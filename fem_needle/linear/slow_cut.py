@@ -7,6 +7,7 @@ on it linearly, so that two unknowns are solved for.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -14,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_needle.collocation import collocation
-from fem_needle.loads import load_case
+from fem_needle.loads import LoadCase, load_case
 from fem_needle.path import CutPath, straight_path
-from fem_needle.plant import Operators, Plant, Points
-from fem_needle.scene import Scene, as_function
+from fem_needle.plant import Plant
+from fem_needle.scene import Scene
 from fem_needle.segments import interfaces
-from fem_needle.statics import no_load_case, static_state
+from fem_needle.statics import Statics, no_load_case, rest_of, statics_at
 
 Array = NDArray[np.float64]
 
@@ -46,17 +47,12 @@ def slow_cut(plant: Plant, depth: float, time: float = 0.0) -> CutPath | None:
     scene = plant.scene
     if scene.tissue.rest_line != "cut-path":
         return None
-    path = straight_path(min(first_depth(scene), depth))
+    path = straight_path(min(scene.insertion.first_depth, depth))
     if path.deepest < plant.smallest_depth:
         path = straight_path(min(plant.smallest_depth, depth))
     for start, end in pairwise(_marks(scene, path.deepest, depth)):
         path = _with_piece(plant, path, start, end, time)
     return path
-
-
-def first_depth(scene: Scene) -> float:
-    """Return the depth [m] at which a scene's insertion begins."""
-    return scene.insertion.first_depth if scene.insertion.kind == "force" else scene.insertion.depth_range(scene.duration)[0]
 
 
 def _marks(scene: Scene, start: float, end: float) -> list[float]:
@@ -71,34 +67,19 @@ def _marks(scene: Scene, start: float, end: float) -> list[float]:
 
 def _with_piece(plant: Plant, path: CutPath, start: float, end: float, time: float) -> CutPath:
     """Return the path with what the tip cuts between two depths in one layer."""
-    middle, nodes = 0.5 * (start + end), collocation(0.0).nodes
-    begin = _tip(plant, _Place(plant, start, middle, time), path)
-    positions = [start, *(start + nodes * (end - start))[:-1].tolist(), end]
-    places = [_Place(plant, position, middle, time) for position in positions[1:]]
-    base = np.full(len(places), begin)
-    known = np.array([_tip(plant, place, path.extended(positions, [begin, *base])) for place in places])
-    answers = np.zeros((len(places), len(places)))
-    for node, unit in enumerate(np.eye(len(places))):
-        bent = replace(straight_path(start), edges=np.array([start])).extended(positions, [0.0, *unit])
-        answers[:, node] = [_tip(plant, place, bent, loaded=False) for place in places]
-    tips = base + np.linalg.solve(np.eye(len(places)) - answers, known - base)
+    case = load_case(plant.scene, 0.5 * (start + end), time)
+    begin = statics_at(plant, start, time, path).tip(case)
+    positions = [start, *(start + collocation(0.0).nodes * (end - start))[:-1].tolist(), end]
+    straight = [statics_at(plant, place, time) for place in positions[1:]]
+    count = len(straight)
+    base = np.full(count, begin)
+    known = _tips(straight, case, path.extended(positions, [begin, *base]))
+    units = (straight_path(start).extended(positions, [0.0, *unit]) for unit in np.eye(count))
+    answers = np.stack([_tips(straight, no_load_case(case), bent) for bent in units], axis=1)
+    tips = base + np.linalg.solve(np.eye(count) - answers, known - base)
     return path.extended(positions, [begin, *tips.tolist()])
 
 
-class _Place:
-    """Matrices and loads at a depth, the layer at the tip that of another depth in the same one."""
-
-    def __init__(self, plant: Plant, depth: float, inside: float, time: float) -> None:
-        self.depth, self.time = depth, time
-        self.operators: Operators = plant.operators(depth, time)
-        self.points: Points = plant.points(depth)
-        self.case = load_case(plant.scene, inside, time)
-        self.factor = float(as_function(plant.scene.tissue.stiffness_factor).value(time))
-
-
-def _tip(plant: Plant, place: _Place, path: CutPath, *, loaded: bool = True) -> float:
-    """Return the tip's deflection [m] on a path; without the loads and the hub's own place what the path alone does."""
-    case = place.case if loaded else no_load_case(place.case)
-    rest = place.factor * plant.rest_terms(path, place.depth, -np.inf, np.inf).load
-    state = static_state(plant, place.operators, place.points, case, depth=place.depth, time=place.time, rest_load=rest)
-    return float(place.points.deflections(*state)[-1])
+def _tips(places: Sequence[Statics], case: LoadCase, path: CutPath) -> Array:
+    """Return the tip's deflections [m] at several depths on a path."""
+    return np.array([replace(one, rest=rest_of(one.plant, path, one.depth, one.time)).tip(case) for one in places])

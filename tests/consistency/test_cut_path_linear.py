@@ -90,6 +90,16 @@ def test_the_axial_row_is_the_rate_of_the_axial_force():
     assert float(model.stiffness[0] @ np.concatenate([[1.0], free])) == pytest.approx(pushed, rel=1e-5)
 
 
+def test_tissue_is_straight_over_the_first_depth_also_where_the_needle_is_drawn_back_first():
+    back = {"kind": "profile", "depth": {"time": [0.0, 4.0, 20.0], "value": [0.06, 0.03, 0.11]}}
+    scene = GEL.with_values({"insertion": back, "run.duration": 20.0})
+    run, path = run_scene(scene), slow_cut(build_plant(scene), 0.11)
+    own = run.samples.path_at(len(run.time) - 1)
+    assert path.edges[0] == own.edges[0] == 0.06
+    places = np.linspace(0.0, 0.11, 200)
+    assert np.max(np.abs(path.value(places) - own.value(places))) < 2e-5 * np.max(np.abs(run.tip_deflection))
+
+
 def test_what_a_controller_knows_of_the_tip_has_the_path():
     plant = build_plant(LAYERS)
     response = model_response(plant, "lateral_force", depths=(0.02, 0.1))
