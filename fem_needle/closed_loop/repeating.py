@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
-from multiprocessing import get_context
+from multiprocessing import current_process, get_context
 from time import perf_counter
 
 from fem_needle.closed_loop.ledger_option import warn_of_energies
@@ -25,6 +25,10 @@ from fem_needle.trajectory import Trajectory
 Progress = Callable[[float], None]
 
 START = 3.0  # s of work from which on the start of processes pays
+NO_ANSWER = (
+    "a process ended without an answer: it was killed, or memory was short, or the script that called runs anew in every process "
+    "(write the call below if __name__ == '__main__':, or give processes=1)"
+)
 # Small matrices: in every process threads would only wait for each other.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -46,7 +50,8 @@ def repeat(
     repetitions
         How many; number i is ``steer(scene, repetition=i)``, i = 1, 2, ...
     processes
-        How many to use; default: one, and as many as there are cores where the first repetition shows that it pays.
+        How many to use; default: one, and as many as there are cores where the first repetition shows that it pays and the
+        caller can start processes. Inside a daemonic process one.
     energies
         As for `steer`.
     progress
@@ -92,12 +97,16 @@ def _nobody(fraction: float) -> None:
 def _all(compute: Compute, repetitions: int, processes: int | None, progress: Progress) -> Iterator[Answer]:
     """Yield all repetitions, in any order: one after the other, until processes pay; up to one that was interrupted."""
     workers, started = (os.cpu_count() or 1) if processes is None else processes, perf_counter()
+    if current_process().daemon:  # which may have no children
+        workers = 1
     for number in range(1, repetitions + 1):
         left, spent = repetitions - number + 1, perf_counter() - started
         pays = processes is not None or (number > 1 and spent / (number - 1) * left > START)
         if workers > 1 and left > 1 and pays:
-            yield from _in_processes(compute, range(number, repetitions + 1), workers, progress)
-            return
+            numbers, must = range(number, repetitions + 1), processes is not None
+            if (yield from _in_processes(compute, numbers, workers, progress, must=must)):
+                return
+            workers = 1  # none of them could begin
         answer = compute(number, partial(_tell_share, progress, number, repetitions))
         yield answer
         if answer[0].stop_reason == "interrupted":
@@ -126,8 +135,13 @@ def _row(scene: Scene, number: int, run: Trajectory, failure: str | None = None)
     return Repetition(number, drawn(scene, number), run.summary, failure, run.time, run.depth, run.tip_deflection)
 
 
-def _in_processes(compute: Compute, numbers: range, workers: int, progress: Progress) -> Iterator[Answer]:
-    """Yield repetitions as they come; each process has one at a time, so that an interrupt leaves none in a queue."""
+def _in_processes(
+    compute: Compute, numbers: range, workers: int, progress: Progress, *, must: bool
+) -> Generator[Answer, None, bool]:
+    """Yield repetitions as they come; each process has one at a time, so that an interrupt leaves none in a queue.
+
+    Returns whether processes could begin at all: those of a script without a guard cannot, which is an error if they ``must``.
+    """
     waiting: set[Future[Answer]] = set()
     left, done = iter(numbers), numbers.start - 1
     # Not forked: the caller may have threads.
@@ -137,13 +151,16 @@ def _in_processes(compute: Compute, numbers: range, workers: int, progress: Prog
             while waiting:
                 finished, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                 waiting |= {pool.submit(_in_process, compute, number) for number in islice(left, len(finished))}
-                done += len(finished)
                 yield from (one.result() for one in finished)
+                done += len(finished)
                 progress(done / numbers[-1])
         except BrokenProcessPool:
-            raise ComputationError("a process ended without an answer: it was killed, or memory was short") from None
+            if done < numbers.start and not must:
+                return False
+            raise ComputationError(NO_ANSWER) from None
         except KeyboardInterrupt:
             yield from (one.result() for one in waiting)
+    return True
 
 
 @contextmanager
